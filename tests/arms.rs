@@ -168,7 +168,7 @@ fn an_export_says_why_points_have_no_place_in_it() {
         assert_eq!(done.code, Some(3), "{target}: {done:?}");
         assert!(done.stderr.contains("three-joint-haptic.toml") && done.stderr.contains("tip.x"), "{target}: {}", done.stderr);
     }
-    // The leader has none; that its weight is held is said.
+    // The leader has none; the output states that its weight is held.
     let done = place.backdrive(&["export", &file("plant/robots/seven-joint-leader.toml"), "--to", "urdf"]);
     assert!(done.stderr.contains("gravity_compensated"), "{done:?}");
 }

@@ -1,5 +1,5 @@
-//! `backdrive diagnose` on a two-joint arm whose logs are made here: what is found is told in text, verdict and page, from tables and from bags alike; what
-//! nothing explains is called so; options that mean nothing and wrong input are told in one sentence.
+//! `backdrive diagnose` on a two-joint arm whose logs are made here. What is found is reported in text, verdict and page, from tables and from bags alike;
+//! what nothing explains is called so. Options without meaning and wrong input are reported in one sentence.
 
 #[path = "../arms/tests/common/mod.rs"]
 mod logs;
@@ -47,10 +47,10 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
     ] {
         assert!(page.contains(said), "the page does not say \"{said}\"");
     }
-    // Torque and friction of two joints, the bars, the motion to record next; each has its numbers in a table for readers without scripts.
+    // Torque and friction of two joints, the bars, the motion to record next; each has its values in a table for readers without scripts.
     assert!(page.matches("<figure").count() >= 5, "{}", page.matches("<figure").count());
 
-    // The same logs as bags, and the page elsewhere: the same is found.
+    // The same logs as bags, and the page in another folder: the same is found.
     let done = place.backdrive(&["bag", "import", "a.csv", "b.csv", "c.csv", "--bag", "bags"]);
     assert_eq!(done.code, Some(0), "{done:?}");
     let topic = |column: &str| format!("{{ topic = '/recording/{column}', field = 'position[0]' }}");
@@ -66,7 +66,7 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
     let force = |v: &Value| v["findings"][0]["parameters"]["force"]["value"].as_f64().unwrap();
     assert!((force(&found) - force(&again)).abs() < 1e-6, "{} {}", force(&found), force(&again));
 
-    // A topic that is not there is told with joint, file and key.
+    // A topic that is not there is reported with joint, file and key.
     place.write("bags.toml", &format!("{files}{}{}", joint("shoulder", 1), joint("elbow", 9)));
     let done = place.backdrive(&["diagnose", "bags.toml", "--out", "no", "--no-report"]);
     assert_eq!(done.code, Some(3), "{done:?}");
@@ -76,7 +76,7 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
 #[test]
 fn what_nothing_explains_is_not_called_fine() {
     let place = Place::new();
-    // A torque on the elbow that nobody knows of: two slow waves that have nothing to do with the motion, in another phase in each log.
+    // An unknown torque on the elbow: two slow waves that are independent of the motion, in another phase in each log.
     set(&place.path(""), &AS_STATED, "", |columns| {
         let phase = 40.0 * columns[2][0];
         let time = columns[0].clone();

@@ -1,5 +1,4 @@
-//! What is wrong is said once, with its place and what to do; the exit code says of which sort it is; nothing panics and
-//! nothing that was there is lost.
+//! An error is reported once, with its place and what to do; the exit code gives its sort; nothing panics and no existing file is lost.
 
 #[path = "common/skipped.rs"]
 mod skipped;
@@ -11,7 +10,7 @@ use std::path::Path;
 use std::process::Command;
 use system::{Ended, Place, Running, file, graph_text};
 
-/// One case: the command, its exit code, and what the error says.
+/// One case: the command, its exit code, and the content of the error.
 struct Case<'a> {
     arguments: Vec<&'a str>,
     code: i32,
@@ -38,7 +37,7 @@ fn assert_told(what: &str, done: &Ended, code: i32, says: &[&str]) {
     }
 }
 
-/// Every case, and afterwards every file is as it was, with none beside them.
+/// Every case, and afterwards every file is unchanged, with none beside them.
 fn check(place: &Place, cases: &[Case]) {
     let before = contents(place);
     for case in cases {
@@ -370,7 +369,7 @@ fn a_full_disk() {
     place.assert_clean(&[]);
 }
 
-/// Runs a script with mounts of its own, or says that this is not allowed here.
+/// Runs a script with mounts of its own, or reports that this is not allowed here.
 fn privileged(place: &Place, script: &str) -> Option<Ended> {
     // SAFETY: has no preconditions and cannot fail.
     let root = unsafe { nix::libc::geteuid() } == 0;

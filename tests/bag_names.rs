@@ -1,4 +1,4 @@
-//! A bag that is there is lost to nobody: not to a second run, not to a run that is asked for again.
+//! An existing bag is never lost: not to a second run, not to a run that is requested again.
 
 mod system;
 

@@ -113,7 +113,7 @@ fn a_table_goes_through_every_format_and_comes_back() {
     {
         assert!((was - is).abs() <= 4e-16 * was.abs(), "{was} became {is}: degrees and back");
     }
-    // What is no recording as it is names the command that makes it one.
+    // For a file that is no recording, the error names the command that makes it one.
     place.write("m.toml", "name = \"arm\"\n[bodies]\nlink = 1.0\n");
     for (paths, command) in [
         (&["arm.parquet"][..], "`backdrive bag import arm.parquet --bag arm-2.mcap` makes it one"),

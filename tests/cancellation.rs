@@ -109,7 +109,7 @@ fn check_16_the_edge_oscillates_at_the_phase_crossover_of_the_loop() {
 
 #[test]
 fn check_14_on_the_nonlinear_graph_a_better_model_is_stable_at_a_higher_gain() {
-    // The friction of the device hides the edge: it is the edge of the contact script, by the product's own verdict.
+    // The friction of the device hides the stability limit: it is the limit of the contact script, by the product's own verdict.
     let beyond = |canceller: &str, lambda: f64| {
         let canceller = if canceller == "none" { "none".into() } else { file(canceller) };
         let graph = contact(Overrides { canceller: Some(canceller), lambda: Some(lambda), ..Overrides::default() });

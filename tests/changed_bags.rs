@@ -77,7 +77,7 @@ fn a_bag_with_a_hole_is_whole_by_no_verb_and_what_is_missing_is_said() {
     bag.save(&place.path("filtered.mcap"));
     bag.forget_completeness();
     bag.save(&place.path("hole.mcap"));
-    // A filter may also leave the record of completeness as it was: the messages win.
+    // A filter may also leave the record of completeness unchanged: the messages win.
     for name in ["hole.mcap", "filtered.mcap"] {
         for done in info(&place, name) {
             assert_eq!(done.code, Some(4), "{name}: {done:?}");

@@ -1,4 +1,4 @@
-//! The command line itself: what it says of its exit codes, what shells and `man` get of it, and settings that cannot be meant.
+//! The command line itself: its help on exit codes, its output for shells and `man`, and settings that cannot be meant.
 
 mod system;
 

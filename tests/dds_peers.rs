@@ -51,7 +51,7 @@ fn told(child: Child) -> Value {
     serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// Starts it, and waits until it says that it listens.
+/// Starts it, and waits until it reports that it listens.
 fn listening(mut command: Command) -> Child {
     let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
     // Byte by byte: what comes later is read by somebody else.
@@ -157,7 +157,7 @@ fn cyclone_hears_every_topic_of_a_run_and_publishes_it_for_us() {
     let bag = folder.path().join("run.mcap");
     let peer = |words: &[String]| cyclone(&hosts, 1, &python, &words.iter().map(String::as_str).collect::<Vec<_>>());
     every_topic_both_ways(&hosts, peer, &bag);
-    // Other people's reader opens the bag too. It also sees the topic that says which steps samples are of.
+    // Other people's reader opens the bag too. It also sees the topic with the steps of samples.
     let script = "import sys; from pathlib import Path; from rosbags.highlevel import AnyReader\n\
                   with AnyReader([Path(sys.argv[1])]) as r: print(sum(c.topic != '/backdrive/steps' for c, _, _ in r.messages()))";
     let read = Command::new(&python).args(["-c", script]).arg(&bag).output().unwrap();
@@ -270,7 +270,7 @@ fn contact(hosts: &Hosts, host: usize, folder: &Path, bag: &str, more: &[&str]) 
     run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// How a run ended: its exit code, what it said, and its result.
+/// How a run ended: its exit code, its output, and its result.
 fn ended(run: Child) -> (Option<i32>, String, Value) {
     let output = run.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

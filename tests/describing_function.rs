@@ -1,8 +1,8 @@
 //! Limit cycles with known answers: a relay, Coulomb friction with delay, backlash in the loop.
 //!
-//! Each loop is built of model files and run by the product, and its verdict compared with a solution of the same loop by code
-//! that shares nothing with it: between samples each of these loops is linear (or slides under a constant force), so it is
-//! carried from sample to sample in closed form, the sampled delay included. The describing function's own answer stands beside.
+//! Each loop is built of model files and run by the product, and its verdict compared with a solution of the same loop by code that shares nothing
+//! with it. Between samples each of these loops is linear (or slides under a constant force), so it is carried from sample to sample in closed form,
+//! the sampled delay included. The describing function's own answer stands beside.
 
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Overrides, Settings};
@@ -27,7 +27,7 @@ struct Loop {
     duration_s: f64,
 }
 
-/// The pulse lasts so many steps.
+/// The pulse lasts this number of steps.
 const PULSE_STEPS: usize = 100;
 
 impl Loop {
@@ -103,7 +103,7 @@ fn fragment(element: &str) -> String {
     format!("name = \"environment\"\nkind = \"fragment\"\n{element}")
 }
 
-/// A slave that is where it is told to be: what it touches is all that it adds to the loop.
+/// A slave that is exactly at its command: what it touches is all that it adds to the loop.
 fn ideal_slave() -> String {
     device("tip = 0.0", "", "tip", "motion", "tip", "tip")
 }
@@ -184,8 +184,8 @@ fn relay(delay: u64) {
     assert_close("relay, amplitude", amplitude, known_amplitude, 0.03);
     assert_close("relay, frequency", frequency, known_frequency, 0.03);
 
-    // Hamel's condition in continuous time: a square wave of half-period h from sample to sample on average a step late, so that
-    // tau = (delay + 1) T; x(h) = -x(0), v(h) = -v(0), and the velocity is 0 at tau before each switch.
+    // Hamel's condition in continuous time: a square wave of half-period h, held from sample to sample, is on average a step late, so that tau =
+    // (delay + 1) T. Then x(h) = -x(0), v(h) = -v(0), and the velocity is 0 at tau before each switch.
     let tau = (delay + 1) as f64 * T;
     let switch_velocity = |half: f64| {
         let start = antiperiodic(&master, lambda * level, half);
@@ -329,9 +329,9 @@ fn backlash_in_the_slave_s_drive() {
     assert_close("backlash, amplitude", amplitude, known_amplitude, 0.03);
     assert_close("backlash, frequency", frequency, known_frequency, 0.03);
 
-    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes
-    // pi b w A^2, with g half the gap and K g' for the delay; the larger root is the stable cycle. Near, not within 3 %: the
-    // force of play is far from a sine.
+    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes pi b w A^2. Here g
+    // is half the gap, and K g' stands for the delay. The larger root is the stable cycle. Near, not within 3 %: the force of play is far from a
+    // sine.
     let k = lambda * wall * ratio;
     let g = 0.5 * gap + tip_friction / shaft;
     let omega = 2.0 * PI * known_frequency;

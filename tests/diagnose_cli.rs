@@ -1,5 +1,5 @@
-//! `backdrive diagnose` and `backdrive fit` on recordings made here: dry friction that was left out is named, a right model is left alone,
-//! and what cannot be diagnosed is told in one line.
+//! `backdrive diagnose` and `backdrive fit` on recordings made here: omitted dry friction is named, a right model is accepted, and what cannot be
+//! diagnosed is reported in one line.
 
 mod system;
 
@@ -214,7 +214,7 @@ rows = [155, 1900]
     assert!(of("nrmse_after") < 0.2 * of("nrmse_refit"), "{verdict:#}");
     assert!(read(&place, "out/report.html").contains("at the motor: force against"));
 
-    // A bag that was cut off is used as far as it goes, and that is said.
+    // A bag that was cut off is used as far as it goes, and this is reported.
     let whole = std::fs::read(place.path("bags/sweep.mcap")).unwrap();
     std::fs::write(place.path("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
     let done = place.backdrive(&["fit", "model.toml", "cut.mcap"]);
@@ -355,7 +355,7 @@ fn a_hand_that_was_recorded_and_that_nothing_takes_stops_a_diagnosis() {
         assert!(done.stderr.contains(said), "\"{said}\" is missing: {}", done.stderr);
     }
     assert_eq!(place.backdrive(&["fit", "model.toml", "."]).code, Some(3));
-    // Told to, it goes on; what else is not used is a note.
+    // With the option it goes on; other unused data is a note.
     let done = place.backdrive(&["fit", "model.toml", ".", "--ignore-signal", "normal.hand", "--grip", "none"]);
     assert_eq!(done.code, Some(0), "{done:?}");
     assert!(done.stderr.contains("not used") && done.stderr.contains("comment"), "{done:?}");

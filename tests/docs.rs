@@ -1,5 +1,5 @@
-//! The tutorial and the how-to, done as they say: every block of commands in order, with the program on the path, and what the page says that they
-//! say and end with compared with what they do.
+//! The tutorial and the how-to, done step by step: every block of commands in order, with the program on the path. Their output and exit codes are
+//! compared with the page.
 
 #[path = "common/skipped.rs"]
 mod skipped;
@@ -10,10 +10,10 @@ use std::path::Path;
 use std::process::Command;
 use system::{Place, file};
 
-/// Commands that a reader is to type, and what the page says of them.
+/// Commands that a reader is to type, and what the page shows for them.
 struct Block {
     commands: String,
-    /// Lines that are said, in any order; `...` stands for anything.
+    /// Lines of the output, in any order; `...` stands for anything.
     says: Vec<String>,
     /// How the last command ends.
     code: i32,
@@ -34,7 +34,7 @@ fn blocks(path: &str) -> Vec<Block> {
         .collect()
 }
 
-/// Whether a line is as the page says, `...` standing for anything.
+/// Whether a line is that of the page, `...` standing for anything.
 fn is_as_told(line: &str, told: &str) -> bool {
     let mut parts = told.split("...");
     let Some(mut rest) = line.strip_prefix(parts.next().unwrap_or_default()) else { return false };
@@ -135,7 +135,7 @@ fn is_long() -> bool {
     std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1")
 }
 
-/// A command that a page shows, and what its line says of running it.
+/// A command that a page shows, and what its line states about running it.
 struct Shown {
     command: String,
     /// Runs with BACKDRIVE_LONG=1 only: `<!-- long -->`.
@@ -210,7 +210,7 @@ fn every_command_of_the_guide_s_list_works_in_its_order_in_one_folder() {
     let codes = run_in_order(thirteen());
     assert!(codes.len() >= 7, "{codes:?}");
     let code = |begin: &str| codes.iter().find(|(command, _)| command.starts_with(begin)).unwrap_or_else(|| panic!("{begin}: {codes:?}")).1;
-    // The question why is about the run that shakes, not about an earlier one.
+    // The question why concerns the run that oscillates, not an earlier one.
     assert_eq!((code("backdrive run launch/contact.toml --lambda 6"), code("backdrive why shaking.mcap")), (1, 1));
     assert_eq!(code("backdrive run shaking.mcap --lambda 1"), 0);
 }

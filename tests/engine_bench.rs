@@ -1,5 +1,5 @@
-//! The engine test bench as a graph: one answer over both transports and replayed, an observer that tells the engine's torque, and the same
-//! observer telling a hand's force beside a teleoperation loop.
+//! The engine test bench as a graph: one answer over both transports and replayed, an observer that estimates the engine's torque, and the same
+//! observer estimating a hand's force beside a teleoperation loop.
 
 mod system;
 

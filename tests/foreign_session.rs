@@ -327,7 +327,7 @@ impl Truth {
 struct Dress {
     /// Added to the sensor's stamps only: another clock, ns.
     sensor_clock: i64,
-    /// The sensor sends every so many steps.
+    /// Number of steps between messages of the sensor.
     sensor_every: usize,
     /// Deviation of stamps, ns.
     jitter: i64,
@@ -436,7 +436,7 @@ fn the_same_run_in_other_peoples_dress_gives_the_same_session() {
         assert_eq!((&axis.master, &axis.force), (&expected.master, &expected.force));
         assert!(near(&axis.command, &expected.command, 1e-17) && near(&axis.contact, &expected.contact, 1e-14));
         assert_eq!((axis.dither.as_ref(), axis.intent.as_ref()), (expected.dither.as_ref(), expected.intent.as_ref()));
-        // The canceller's command is mu (x_m - x^_mf): in free motion mu can be told, and lambda with its step of delay.
+        // The canceller's command is mu (x_m - x^_mf): in free motion mu can be identified, and lambda with its step of delay.
         assert!(
             (found.mu[0] - 1.0).abs() < 0.02 && (found.lambda[0] - 0.3).abs() < 1e-3,
             "{} {}: {:?}",

@@ -113,7 +113,7 @@ fn no_verb_leaves_half_a_file_on_a_full_disk() {
     println!("{refused} refused");
 }
 
-/// Whether a name is that of a folder, whose size says how much is in it.
+/// Whether a name is that of a folder, whose size depends on its content.
 fn is_folder_in(whole: &[String], name: &str) -> bool {
     whole.iter().any(|line| line.starts_with(&format!("{name}/")))
 }

@@ -1,7 +1,7 @@
 //! Fuzz targets, one for every parser of outside bytes: whole files with bytes, numbers, lines and lengths changed at random go straight into the parser. None may
 //! panic, stand still, or take more memory than an import allows.
 //!
-//! A second a target by default, four with BACKDRIVE_LONG=1; BACKDRIVE_FUZZ_SECONDS says another time, and BACKDRIVE_FUZZ_SEED another seed than 1.
+//! A second a target by default, four with BACKDRIVE_LONG=1; BACKDRIVE_FUZZ_SECONDS sets another time, and BACKDRIVE_FUZZ_SEED another seed than 1.
 //! `tests/mutated.rs` sends such files through whole commands.
 
 #[path = "common/mutation.rs"]
@@ -28,7 +28,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use system::{Place, file, graph_text};
 
-/// Memory that an import here may take for its numbers, bytes; three times as much is the documented peak.
+/// Memory that an import here may take for numbers, bytes; three times as much is the documented peak.
 const MOST_BYTES: u64 = 64 << 20;
 /// Peak that is a failure, bytes.
 const PEAK: usize = 3 * MOST_BYTES as usize + (64 << 20);

@@ -55,7 +55,7 @@ impl Case {
     }
 }
 
-/// The same push held for longer, so that a loop near its edge has rung down.
+/// The same push held for longer, so that a loop near its stability limit has rung down.
 fn held(mut graph: Graph) -> Graph {
     for node in &mut graph.nodes {
         if let Settings::Operator(intents) = &mut node.settings {
@@ -128,7 +128,7 @@ impl Guarded {
 #[test]
 fn a_stable_loop_is_left_alone() {
     let soft = |case: Case| Case { environment: "plant/environments/soft-tissue.toml", ..case };
-    // This wall's stiffness grows with the force: its edge lies lower.
+    // This wall's stiffness grows with the force: its critical gain is lower.
     let hard = |case: Case| Case { environment: "plant/environments/hunt-crossley-wall.toml", edge: 0.7 * case.edge, ..case };
     for case in
         [UNCANCELLED, LINEAR_LOOP, SIXTH, OVER, OVER_LINEAR, soft(UNCANCELLED), soft(LINEAR_LOOP), hard(UNCANCELLED), hard(LINEAR_LOOP)]
@@ -139,7 +139,7 @@ fn a_stable_loop_is_left_alone() {
             assert!(done.trace.contact.iter().any(|f| *f < -0.05), "nothing was touched");
         }
     }
-    // Also with a dither, which itself shakes; above half of the edge the margin may be thin.
+    // Also with a dither, which itself makes the force oscillate; above half of the critical gain the margin may be thin.
     for case in [UNCANCELLED, LINEAR_LOOP, SIXTH, OVER] {
         for share in [0.3, 0.6] {
             let done = run(&case.graph(share, true));
@@ -159,7 +159,7 @@ fn a_loop_far_below_the_edge_of_a_good_canceller_is_left_alone() {
 
 #[test]
 fn beyond_the_edge_the_motion_is_bounded_and_ends_stable() {
-    // Bounds of the master's motion: without the guard it shakes by up to 1 mm (uncancelled) or leaves all bounds (over-cancelled).
+    // Bounds of the master's motion: without the guard it oscillates by up to 1 mm (uncancelled) or leaves all bounds (over-cancelled).
     for (case, bound) in [(UNCANCELLED, 0.007), (LINEAR_LOOP, 0.007), (OVER, 0.03), (OVER_LINEAR, 0.03)] {
         for share in [1.2, 2.0, 5.0] {
             let graph = case.graph(share, false);
@@ -177,7 +177,7 @@ fn beyond_the_edge_the_motion_is_bounded_and_ends_stable() {
             let is_over = case.grip == FIRM;
             assert!(!is_over || done.acts.iter().any(|(_, kind, _)| kind == "guard_runaway"), "{} at {share}: {acts:?}", case.what);
             assert!(share < 2.0 || !done.acts.is_empty(), "{} at {share}: it did nothing", case.what);
-            // It never gives back by itself.
+            // It never raises the gain by itself.
             assert!(done.acts.windows(2).all(|w| w[1].2 < w[0].2), "{acts:?}");
             assert!(done.acts.last().is_none_or(|(_, _, told)| (done.lambda / told - 1.0).abs() < 1e-3), "{} {acts:?}", done.lambda);
         }
@@ -186,7 +186,7 @@ fn beyond_the_edge_the_motion_is_bounded_and_ends_stable() {
 
 #[test]
 fn the_live_margin_says_where_the_edge_of_the_linear_loop_is() {
-    // The loop in contact is linear: its edge by bisection, as a run without guard and dither shows it.
+    // The loop in contact is linear: its critical gain by bisection, from a run without guard and dither.
     let runs = |lambda: f64| {
         let mut graph = LINEAR_LOOP.graph(lambda / LINEAR_LOOP.edge, false);
         unguarded(&mut graph);
@@ -248,7 +248,7 @@ fn a_guarded_push_and_hold_tells_its_margin_while_it_touches() {
     println!("{told} of {}", held.len());
     assert!(held.len() > 70 && 10 * told >= 6 * held.len(), "{told} of {}", held.len());
     assert!(held.iter().all(|m| m.known != margin::FREE), "it touches");
-    // The edge of this loop by bisection is at 2.1: no known margin or bound is beyond it by more than its own uncertainty.
+    // The critical gain of this loop by bisection is 2.1: no known margin or bound is above it by more than its own uncertainty.
     for m in held.iter().filter(|m| !m.factor.is_nan()) {
         let sd = if m.deviation.is_nan() { 0.0 } else { m.deviation };
         println!("{:.1} {} {:.2} {:.2}", m.step as f64 * PERIOD, m.known, m.factor, sd);

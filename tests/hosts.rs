@@ -87,7 +87,7 @@ fn run_with(hosts: &Hosts, host: usize, folder: &Path, digits: &str, more: &[&st
     spawn(command)
 }
 
-/// On a busy machine a part of the samples comes late: then the run is not judged, and says so. It is never judged unstable.
+/// On a busy machine a part of the samples comes late: then the run is not judged, and reports this. It is never judged unstable.
 fn assert_stable_or_too_late(host: &str, report: &Value, code: Option<i32>, told: &str) {
     let judged = (code, report["outcome"].as_str(), report["outcome_detail"]["why"].as_str());
     let expected = [(Some(0), Some("stable"), None), (Some(7), Some("cannot_tell"), Some("gaps"))];
@@ -98,10 +98,10 @@ fn spawn(mut command: Command) -> Running {
     Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
 }
 
-/// Standard output as JSON, the end, and what it said on standard error.
+/// Standard output as JSON, the end, and its standard error.
 fn end(mut child: Running, limit: Duration) -> (Value, Option<i32>, String) {
     let begun = Instant::now();
-    // Both at once: a pipe that nobody reads stops its writer.
+    // Both at once: a pipe without a reader stops its writer.
     fn all(mut from: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
         std::thread::spawn(move || {
             let mut text = String::new();
@@ -130,7 +130,7 @@ fn without_multicast(hosts: &Hosts) {
     }
 }
 
-/// What a host is told instead.
+/// What a host gets instead.
 fn by_address(host: usize) -> [&'static str; 4] {
     ["--peer", ADDRESSES[1 - host], "--interface", "veth0"]
 }
@@ -304,7 +304,7 @@ fn a_cut_link_a_killed_and_a_restarted_host_and_the_force_decays_and_comes_back(
             assert!(count(&desk, kind) >= 2, "{kind}: {desk:?}\n{desk_told}");
         }
         assert!(count(&robot, "joined_late") >= 1, "{robot:?}\n{robot_told}");
-        // What the killed host had recorded can be saved, and tells of the cut.
+        // What the killed host had recorded can be saved, and shows the cut.
         let saved = folder.path().join("saved.mcap");
         backdrive_bags::recover(&folder.path().join("killed.mcap"), &saved, false).unwrap();
         let killed = events(&Reader::open(&saved).unwrap());
@@ -324,7 +324,7 @@ fn on_a_link_that_reorders_and_loses_what_is_late_is_dropped_and_all_is_counted(
     one_of_three(|| {
         let Some(hosts) = Hosts::relayed(Link { delay_s: 2e-3, jitter_s: 4e-3, loss: 0.02, cut: false }) else { return };
         let folder = tempfile::tempdir().unwrap();
-        // Far below the edge that this delay leaves.
+        // Far below the stability limit with this delay.
         let options = ["--duration", "6", "--lambda", "0.1"];
         let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &options));
         for (host, run) in runs.into_iter().enumerate() {
@@ -342,7 +342,7 @@ fn on_a_link_that_reorders_and_loses_what_is_late_is_dropped_and_all_is_counted(
             });
             let steps: Vec<u64> = commands.collect();
             assert!(steps.len() > 3000 && steps.windows(2).all(|w| w[0] < w[1]), "{}: {} commands", HOSTS[host], steps.len());
-            // Where more is missing than a verdict can bear it says so.
+            // Where more is missing than a verdict can bear it reports this.
             assert!(matches!(report["outcome"].as_str(), Some("stable" | "cannot_tell")), "{}: {report}", HOSTS[host]);
         }
     });
@@ -399,7 +399,7 @@ fn a_stopped_slave_does_no_harm_and_a_second_master_ends_the_run_on_both_hosts()
             assert!(report["refused"].as_u64().unwrap() > 0, "{}: {report}", HOSTS[host]);
             assert!(told.contains("/slave/servo_jp: a stranger speaks here (GID "), "{}: {told}", HOSTS[host]);
         }
-        // The slave's node says it in its own host's bag.
+        // The slave's node reports it in its own host's bag.
         let bag = bag(folder.path(), 1);
         let all = events(&bag);
         assert!(all.iter().any(|(kind, text, count)| kind == "stranger" && text.contains("/slave/servo_jp") && *count >= 1.0), "{all:?}");
@@ -476,7 +476,8 @@ fn a_wall_clock_that_is_stepped_by_a_minute_stops_nobody() {
         if !built.is_ok_and(|s| s.success()) {
             return skipped("there is no C compiler to make a clock that can be stepped");
         }
-        // Twice the ten seconds after which a participant says again that it is there, for its first word may be lost, and after which an offset is told again.
+        // Twice the ten seconds after which a participant announces itself again, because its first message may be lost, and after which an offset is reported
+        // again.
         let seconds: u64 = 24;
         let duration = seconds.to_string();
         let desk = run_on(&hosts, 0, folder.path(), &["--duration", &duration]);
@@ -509,7 +510,7 @@ fn a_wall_clock_that_is_stepped_by_a_minute_stops_nobody() {
         let heard = robot.completeness().unwrap().topics.iter().find(|t| t.topic == "/slave/servo_jp").unwrap().last_step.unwrap();
         assert!(heard > 1000 * seconds - 500, "the robot hears nothing after step {heard}\n{robot_told}");
         let measured = desk.completeness().unwrap().topics.iter().find(|t| t.topic == "/master/measured_js").unwrap().clone();
-        // The master goes on to its end. That nothing is lost on the way is asked for elsewhere: this is about the clock.
+        // The master goes on to its end. Another test requires that nothing is lost on the way: this is about the clock.
         assert_eq!(measured.last_step, Some(1000 * seconds - 1), "{desk_told}");
         assert!(measured.lost <= 10 * seconds, "{} of {} lost\n{desk_told}", measured.lost, measured.written);
         // And the step is measured.

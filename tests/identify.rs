@@ -1,4 +1,4 @@
-//! The identification graphs: what they record, that the device's own model explains it, and what the paper says of it.
+//! The identification graphs: what they record, that the device's own model explains it, and the paper's results.
 //!
 //! Expected numbers are computed from the model files, of whose readings of the paper they are as sure as those.
 
@@ -272,7 +272,7 @@ fn line(signal: &[f64], frequency: f64) -> (f64, f64) {
 #[test]
 fn the_recorded_impacts_are_what_their_graph_makes() {
     let temp = tempfile::tempdir().unwrap();
-    // A hand that never rests says nothing of the loop's stability, and is not asked to here.
+    // A hand that never rests gives no information on the loop's stability, and is not asked to here.
     let run = backdrive(&["run", &file("launch/identify/knocks.toml"), "--transport", "inproc", "--bag", "knocks.mcap"], temp.path());
     assert_eq!(run.status.code(), Some(7), "{run:?}");
     succeeds(&["bag", "export", "knocks.mcap", "--csv", "impacts.csv", "--topic", "/master/servo_jf"], temp.path());

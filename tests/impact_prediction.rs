@@ -1,8 +1,8 @@
 //! Check 15 of the paper notes: how well a model predicts what impact forces do to the held master in the first 50 ms.
 //!
-//! The real device here is not of the model's class: its friction and its linkage hysteresis are fields of distributed
-//! bristles (many sliders in parallel), and its encoder rounds. The models are fitted to its recordings of an
-//! identification experiment and judged on impacts that no fit has seen, played through the running graph.
+//! The real device here is not of the model's class: its friction and its linkage hysteresis are fields of distributed bristles (many sliders in
+//! parallel), and its encoder rounds. The models are fitted to its recordings of an identification experiment and judged on held-out impacts, played
+//! through the running graph.
 
 mod common;
 

@@ -117,7 +117,7 @@ fn a_load_a_hand_and_both_sensors_have_their_places() {
     let (model, set) = written(&place);
     assert_eq!(model.bodies.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), ["motor", "load", "hand"]);
     assert_eq!(model.outputs.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["enc", "rpm"]);
-    // Two halves on the joint ring where it was said.
+    // Two halves on the joint ring, as in the answers.
     let of = |path: &str| model.values_at(path).unwrap()[0];
     let ring = (of("elements.joint.stiffness") * (1.0 / of("bodies.motor") + 1.0 / of("bodies.load"))).sqrt() / std::f64::consts::TAU;
     assert!((ring - 20.0).abs() < 0.2, "{ring}");

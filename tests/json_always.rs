@@ -14,7 +14,7 @@ fn json(what: &str, done: &Ended) -> Value {
     value
 }
 
-/// A failure: its code as the process ends, a word for it, and what standard error says.
+/// A failure: its code as the process ends, a word for it, and its standard error.
 fn assert_error(what: &str, done: &Ended, code: i32, kind: &str) {
     let value = json(what, done);
     assert_eq!(done.code, Some(code), "{what}: {done:?}");
@@ -25,7 +25,7 @@ fn assert_error(what: &str, done: &Ended, code: i32, kind: &str) {
     assert!(error["hints"].is_array(), "{what}: {done:?}");
 }
 
-/// Every verb that has the option, as the program's own help says, with the words that name it.
+/// Every verb that has the option, from the program's own help, with the words that name it.
 fn verbs() -> Vec<Vec<String>> {
     let help = |words: &[String]| {
         let done = Command::new(env!("CARGO_BIN_EXE_backdrive")).args(words).arg("--help").output().unwrap();
@@ -63,7 +63,7 @@ fn absent(verb: &[String]) -> Option<Vec<&'static str>> {
         ["model", _] => vec!["absent.toml"],
         ["bag", "merge"] => vec!["absent.mcap", "other.mcap", "--bag", "out.mcap"],
         ["bag", "diff"] => vec!["absent.mcap", "other.mcap"],
-        // A machine is looked at as it is.
+        // A machine is examined without changes.
         ["doctor"] => return None,
         _ => vec!["absent"],
     })

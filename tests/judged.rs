@@ -1,5 +1,5 @@
-//! How a loop is judged: one judgement by every verb; in free motion where the law reflects motion, at low rates, under a coarse sensor. What shakes
-//! is measured here by the handle's true motion and the force at the hand, which no verb looks at.
+//! How a loop is judged: one judgement by every verb; in free motion where the law reflects motion, at low rates, under a coarse sensor. The
+//! oscillation is measured here by the handle's true motion and the force at the hand, which no verb uses.
 
 mod system;
 
@@ -21,7 +21,7 @@ fn peak_to_peak(signal: impl Iterator<Item = f64>) -> f64 {
     high - low
 }
 
-/// Amplitude and frequency that a verb says of a limit cycle.
+/// A verb's amplitude and frequency of a limit cycle.
 fn cycle(said: &serde_json::Value) -> (f64, f64) {
     assert_eq!(said["outcome"], "limit_cycle", "{said}");
     (said["amplitude_m"].as_f64().unwrap(), said["frequency_hz"].as_f64().unwrap())
@@ -138,7 +138,7 @@ fn held_graph(law: &str, more: Overrides) -> Graph {
     Graph::load(&PathBuf::from(file("launch/coupling.toml")), &changes).unwrap()
 }
 
-/// What the product says of a run, and how far handle or slave truly move in the last second of the hold and in the one before.
+/// The product's verdict on a run, and how far handle or slave truly move in the last second of the hold and in the one before.
 fn judged(graph: &Graph) -> (Option<Outcome>, [f64; 2]) {
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name).unwrap()).collect();
     let mut sequence = Sequence::new(plans, &graph.timing).unwrap();

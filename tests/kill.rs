@@ -1,4 +1,4 @@
-//! A process of a running graph is killed: what the hand feels, what is left behind, and what the bag still holds.
+//! A process of a running graph is killed: what the hand feels, what remains, and what the bag still holds.
 
 mod system;
 
@@ -71,7 +71,7 @@ fn assert_decay(node: &str, killed: &Killed, last: u64, kind: &str, extra: u64) 
     let rows = samples(&killed.bag, "/master/measured_js");
     let held = rows.iter().rfind(|s| s.step < start).unwrap().effort[0];
     assert!(held < -0.3, "the wall was not felt: {held} N");
-    // A slave that lives still tells what it feels, so the force that decays is not quite the one before.
+    // A slave that lives still reports what it feels, so the force that decays is not quite the one before.
     let slack = if kind == "force_outdated" { 0.05 * held.abs() } else { 1e-9 };
     for row in rows.iter().filter(|s| s.step >= start) {
         let down = row.step - start + 1;
@@ -258,7 +258,7 @@ fn a_slave_that_is_started_again_brings_the_force_back() {
     place.assert_clean(&runs);
 }
 
-/// Two nodes in one process die together and come back together; each says so itself.
+/// Two nodes in one process die together and come back together; each reports this itself.
 #[test]
 fn nodes_together_in_a_process_come_back_together() {
     let (_alone, place) = (alone(), Place::new());
@@ -287,7 +287,7 @@ fn nodes_together_in_a_process_come_back_together() {
     place.assert_clean(&runs);
 }
 
-/// Nobody dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
+/// No node dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
 #[test]
 fn a_connection_that_fails_lets_the_force_go() {
     let place = Place::new();

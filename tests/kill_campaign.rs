@@ -1,5 +1,5 @@
-//! Processes of runs are killed, stopped, terminated and interrupted at random moments: every run ends in bounded time with the documented
-//! exit code, leaves nothing behind, its bag can be read, and the force at the hand is gone within 20 ms.
+//! Processes of runs are killed, stopped, terminated and interrupted at random moments. Every run ends in bounded time with the documented exit code
+//! and leaves nothing behind, its bag can be read, and the force at the hand is gone within 20 ms.
 //!
 //! Four by default, 12 with `BACKDRIVE_LONG=1`, 150 with `BACKDRIVE_FULL=1`; `BACKDRIVE_SEED` draws others.
 
@@ -22,8 +22,8 @@ const RATE: f64 = 1000.0;
 const LASTS_S: f64 = 2.2;
 /// A force is gone so long after the last good sample, s.
 const GONE_S: f64 = 0.020;
-/// How long after its planned end, or after it was struck where it has none, a run may last: a node that hangs is asked after 3 s and killed
-/// 4 s later, a recorder then has 4 s; and what a busy machine adds.
+/// How long after its planned end, or after it was struck where it has none, a run may last. A node that hangs is asked after 3 s and killed 4 s
+/// later, a recorder then has 4 s; the rest is for a busy machine.
 const BOUND: Duration = Duration::from_secs(20);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,7 +57,7 @@ fn draw(random: &mut ChaCha8Rng, number: usize) -> Strike {
     let whom = if way == Way::Here { "supervisor" } else { nodes[random.random_range(0..nodes.len())] };
     let signals = [Signal::SIGKILL, Signal::SIGKILL, Signal::SIGSTOP, Signal::SIGTERM, Signal::SIGINT];
     let signal = match signals[random.random_range(0..signals.len())] {
-        // A run in one process leaves SIGINT as it was, and a shell that tests in the background has it ignored.
+        // A run in one process leaves SIGINT unchanged, and a shell that tests in the background has it ignored.
         Signal::SIGINT if way == Way::Here => Signal::SIGTERM,
         signal => signal,
     };
@@ -72,8 +72,8 @@ fn stalls(rows: &[Sample], from_ns: i64, to_ns: i64) -> f64 {
     pairs.map(|w| ((w[1].stamp_ns - w[0].stamp_ns) as f64 * 1e-9 - 1.0 / RATE).max(0.0)).sum()
 }
 
-/// Where a node of the loop fell silent while the hand felt a force: time from its last good sample to the last force at the master, s, and what
-/// of that time the machine withheld its processors from the other nodes.
+/// Where a node of the loop fell silent while the hand felt a force. Values: time from its last good sample to the last force at the master, s, and the part
+/// of that time in which the machine withheld its processors from the other nodes.
 fn force_after(bag: &Path, whom: &str) -> Vec<(f64, f64)> {
     let mut topics: BTreeMap<String, Vec<Sample>> = BTreeMap::new();
     for (topic, message) in messages(bag) {
@@ -142,7 +142,7 @@ fn strike(what: &Strike) -> Came {
     let endless = matches!(what.way, Way::Here | Way::Lockstep);
     let continues = what.whom == "supervisor" && what.signal == Signal::SIGSTOP;
     if struck && continues {
-        // Nobody watches: whoever stopped it continues it.
+        // There is no watcher: whoever stopped it continues it.
         std::thread::sleep(Duration::from_millis(700));
         let _ = nix::sys::signal::kill(Pid::from_raw(run.pid()), Signal::SIGCONT);
     }

@@ -46,7 +46,7 @@ fn graph_of(reader: &Reader) -> Graph {
 #[test]
 fn a_long_bag_is_judged_in_all_its_pieces_and_its_rows_are_those_of_the_worst() {
     let place = Place::new();
-    // 20000 steps. What shakes does so near the end only, and not in the first pieces.
+    // 20000 steps. The oscillation is near the end only, and not in the first pieces.
     let calm = record(&place, "calm.mcap", |_, _| {});
     let shaken = record(&place, "shaken.mcap", |topic, sample| {
         if topic == "/master/measured_js" && sample.step >= 12_000 {
@@ -89,7 +89,7 @@ fn a_long_bag_is_judged_in_all_its_pieces_and_its_rows_are_those_of_the_worst() 
     assert_eq!(recorded_outcome(&pieces(&cut, 8_000)).map(|o| o.word()), Some("cannot_tell"));
 }
 
-/// What the test below starts: it reads a bag in pieces and says how much memory that took at most, kB.
+/// What the test below starts: it reads a bag in pieces and prints its peak memory, kB.
 #[test]
 #[ignore = "only of use as the process that is measured"]
 fn victim() {
@@ -101,7 +101,7 @@ fn victim() {
     println!("{}", status.lines().find(|line| line.starts_with("VmHWM")).unwrap());
 }
 
-/// Peak memory of reading a bag that repeats a run so many times, kB.
+/// Peak memory of reading a bag that repeats a run N times, kB.
 fn peak_kb(place: &Place, times: u64) -> u64 {
     let from = place.path("run.mcap");
     let reader = Reader::open(&from).unwrap();

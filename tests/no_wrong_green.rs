@@ -1,5 +1,5 @@
-//! A loop is called stable only by a whole recording in which it was closed: one that is cut short, in which a node died, that lost messages or
-//! touched nothing says at most that it cannot be told, and what to record.
+//! A loop is called stable only by a whole recording in which it was closed. For one that is cut short, in which a node died, that lost messages or
+//! touched nothing, the verdict is at most "cannot tell", with what to record.
 
 mod system;
 
@@ -125,7 +125,7 @@ fn times([few, more, most]: [usize; 3]) -> usize {
 
 /// The verdict at the gains asked about, by re-simulation and by the recording.
 fn words(place: &Place, bag: &str) -> Vec<String> {
-    // The lower is stable, at the higher the whole bag says that it is not.
+    // The lower is stable; at the higher the whole bag shows that it is not.
     ["0.3", "20"]
         .iter()
         .map(|gain| ask(place, bag, &["--gain", gain, "--grips", "1"])["verdict"].as_str().unwrap_or("nothing").to_string())

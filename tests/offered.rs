@@ -1,7 +1,7 @@
 //! Every command that a terminal, a page or JSON offers works when it is pasted into the shell of the folder.
 //!
 //! The commands are collected from what the verbs print and write, and each is run as it stands, in its order, in the same folder. Of commands that
-//! search for minutes (`diagnose` with more effort) the effort is brought down before they are run: what they name is looked at all the same.
+//! search for minutes (`diagnose` with more effort) the effort is reduced before they are run: what they name is checked nevertheless.
 
 #[path = "../arms/tests/common/mod.rs"]
 mod arms;
@@ -147,7 +147,7 @@ fn what_is_offered_after_a_damaged_bag_works_as_it_stands() {
     let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
     let recovered = place.command("bash").env("PATH", search).args(["-c", &recover[0]]).output();
     let code = recovered.unwrap().status.code();
-    // Something of a bag that was cut is lost, and that is said by the exit code.
+    // A part of a bag that was cut is lost, and the exit code shows this.
     assert!(matches!(code, Some(0 | 4)), "{code:?}");
 }
 
@@ -239,7 +239,7 @@ fn a_bag_that_breaks_off_before_its_first_message_is_recovered_or_recorded_again
     }
 }
 
-/// A command that is put together by hand is one that nobody checked.
+/// A command that is put together by hand is not checked by anything.
 #[test]
 fn offered_commands_are_built_in_one_place() {
     let mut files = vec![std::path::PathBuf::from(file("src")), std::path::PathBuf::from(file("pages/src"))];

@@ -1,4 +1,4 @@
-//! Where what a verb says cannot go: a full standard output, a full standard error, a reader that has enough, a file that cannot be written.
+//! Where the output of a verb cannot go: a full standard output, a full standard error, a reader that has enough, a file that cannot be written.
 
 mod system;
 
@@ -89,7 +89,7 @@ fn a_full_standard_error_changes_no_answer() {
         }
         assert_eq!(closed.code(), open.code(), "{verb:?}");
     }
-    // What fails says so with its code where nobody can hear it.
+    // A failure has its exit code even where its message cannot be written.
     let wrong = ["bag".to_string(), "info".to_string(), "absent.mcap".to_string()];
     assert_eq!(program(&place, &wrong).stderr(full()).status().unwrap().code(), Some(3));
     assert_eq!(program(&place, &["no-verb".to_string()]).stderr(full()).status().unwrap().code(), Some(2));

@@ -1,5 +1,5 @@
 //! Files as people have them: units in every usual place, tables without a heading or times, NumPy archives, matrices, MCAP with JSON or protobuf.
-//! What is read is read in its units, and what is not read is refused in one line that says what to do.
+//! What is read is read in its units, and what is not read is refused in one line that explains what to do.
 
 mod system;
 
@@ -80,10 +80,10 @@ fn an_unknown_unit_is_asked_for_by_name() {
     is_refused(&init(&place, &of), 2, &["say --position-unit", "\"grad\"", "is not known"]);
     recorded(&place, "time (h),tau (Nm),q (rad)", 1.0 / 3600.0, 1.0);
     is_refused(&init(&place, &of), 2, &["say --time-unit", "\"h\" of its heading is not known"]);
-    // Whoever says it is believed.
+    // A stated unit is accepted.
     recorded(&place, "time (s),tau (Nm),q (gon)", 1.0, 1.0);
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "rad"]].concat()));
-    // A bag keeps such numbers as they are, and says so.
+    // A bag keeps such numbers unchanged, and reports this.
     let done = place.backdrive(&["bag", "import", "mine/a.csv", "--time", "time", "--bag", "a.mcap"]);
     assert!(done.code == Some(0) && done.stderr.contains("the unit \"gon\" is not known"), "{done:?}");
 }
@@ -97,7 +97,7 @@ fn without_units_degrees_are_no_radians_and_milliseconds_no_seconds() {
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "deg"]].concat()));
     recorded(&place, "t,tau,q", 1000.0, 1.0);
     is_refused(&init(&place, &of), 2, &["nothing states the unit of t", "2.00 s apart", "--time-unit ms"]);
-    // What is assumed is said, and nothing is called fine.
+    // An assumption is reported, and nothing is called fine.
     recorded(&place, "t,tau,q", 1.0, 1.0);
     let done = init(&place, &of);
     is_right(&place, &done);

@@ -1,4 +1,4 @@
-//! A program of the user's own in the place of a node: examples/own_master.rs, started by launch/own-master.toml.
+//! A program of the user's own instead of a node: examples/own_master.rs, started by launch/own-master.toml.
 
 use backdrive_bags::{Reader, Signal, signals};
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ fn a_program_of_ones_own_runs_in_the_loop() {
     let reader = Reader::open(&folder.path().join("own.mcap")).unwrap();
     assert!(reader.ended_cleanly() && reader.completeness().unwrap().is_complete());
     let published = |node: &str| reader.header().unwrap().topics.iter().filter(|t| t.publisher == node).count();
-    // Its own state, events and status, as one of ours would tell them.
+    // Its own state, events and status, as one of our nodes would report them.
     assert_eq!(published("master"), 4);
     let wanted = [
         Signal::new("position", "/master/measured_js", "position[0]"),

@@ -1,4 +1,4 @@
-//! `backdrive prove`: the seal, what the bags do not tell, and that the diagnosis does not need the truth.
+//! `backdrive prove`: the seal, what the bags do not contain, and that the diagnosis does not need the truth.
 
 #[path = "common/skipped.rs"]
 mod skipped;
@@ -55,7 +55,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!([Some(0), Some(1)].contains(&ended.code), "{ended:?}");
     let case = place.path("proof/case-001");
 
-    // The digest was said first, and is the truth's.
+    // The digest was printed first, and is the truth's.
     let truth = std::fs::read(case.join("sealed/truth.json")).unwrap();
     let digest: String = Sha256::digest(&truth).iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(ended.stdout.lines().next().unwrap().contains(&digest), "{}", ended.stdout);
@@ -97,20 +97,20 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!(gain("none") > 0.05 && gain("diagnosed") > 0.0 && gain("chosen") >= 0.94 * gain("none").min(gain("diagnosed")));
     assert!(place.path("proof/proof.html").is_file());
 
-    // All effects count once, and again where the refitted nominal model stays away from what no fit has seen.
+    // All effects count once, and again where the refitted nominal model differs from held-out data.
     let floors = found["refit_floors"].as_f64().unwrap();
     assert!(floors > 0.5, "{floors}");
     let summary = &proof["summary"];
     assert_eq!((&summary["place"]["of"], &summary["showing"]["place"]["of"]), (&1.into(), &usize::from(floors >= 3.0).into()), "{summary}");
 
-    // The graph itself was run below and above the edge without canceller; its bags are there.
+    // The graph itself was run below and above the critical gain without canceller; its bags are there.
     let live = found["live"].as_array().unwrap();
     let of_none = |below: bool| live.iter().find(|run| run["canceller"] == "none" && run["below_edge"] == below).unwrap();
     assert_eq!(of_none(true)["outcome"], "stable");
     assert_ne!(of_none(false)["outcome"], "stable");
     assert!(case.join("live/none-below.mcap").is_file());
 
-    // Once more where nobody could look: the truth is gone, and the diagnosis does as before.
+    // Once more where no process could look: the truth is gone, and the diagnosis does as before.
     std::fs::rename(case.join("sealed"), place.path("elsewhere")).unwrap();
     let (session, out) = (case.join("session"), place.path("again"));
     let (session, out) = (session.display().to_string(), out.display().to_string());
@@ -134,12 +134,12 @@ fn what_cannot_be_proven_is_told_in_one_line() {
     assert!(ended.code == Some(2) && ended.stderr.contains("from 0 to 3"), "{ended:?}");
     let ended = prove_with(&place, &[("--session", "nothing.toml")], &["--out", "other"]);
     assert!(ended.code == Some(3) && ended.stderr.contains("nothing.toml"), "{ended:?}");
-    // Of what is needed last it is told first, and nothing is sealed that would stand in the way of the next try.
+    // An error in what is needed last is reported first, and nothing is sealed that would prevent the next try.
     let ended = prove_with(&place, &[("--contact", "no-task.toml")], &["--out", "third"]);
     assert_eq!(ended.code, Some(3), "{ended:?}");
     assert!(ended.stderr.contains("no-task.toml") && ended.stderr.contains("--contact"), "{}", ended.stderr);
     assert!(!place.path("third").exists());
-    // A pipe that nobody writes, and a device that never ends, are no files, whichever of them it is.
+    // A pipe without a writer, and a device that never ends, are no files, whichever of them it is.
     let pipe = place.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for option in ["--model", "--grip", "--second-order", "--session", "--contact", "--regrip"] {

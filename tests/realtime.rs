@@ -208,8 +208,8 @@ fn a_change_of_gains_ramps() {
 
 /// Ten seconds each at 5 and at 10 kHz with BACKDRIVE_LONG=1, a minute each with BACKDRIVE_FULL=1, else nothing.
 ///
-/// A shared machine may take the processor away for longer than any buffer holds, so at 5 kHz one whole run in three
-/// attempts is enough, and at 10 kHz, which takes most of two processors, only this is asked: a run that is not whole says so.
+/// A shared machine may take the processor away for longer than any buffer holds, so at 5 kHz one whole run in three attempts is enough. At 10 kHz,
+/// which takes most of two processors, only this is required: a run that is not whole reports this.
 #[test]
 fn at_5_and_at_10_khz_is_recorded_whole_what_ran_in_real_time() {
     let asked = |name: &str| std::env::var(name).is_ok_and(|v| v == "1");

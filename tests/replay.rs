@@ -1,4 +1,4 @@
-//! A bag's graph run again: what the hand did comes from the bag, everything else from its models, changed as asked.
+//! Re-simulation of a bag's graph: the hand's motion comes from the bag, everything else from its models, changed as asked.
 
 mod system;
 

@@ -1,4 +1,4 @@
-//! The page of a run and of a replay: one file that says what happened, in one process, in processes, and of a run that went wrong.
+//! The page of a run and of a replay: one file that shows what happened, in one process, in processes, and of a run that went wrong.
 
 mod system;
 

@@ -1,4 +1,4 @@
-//! `backdrive stability` from the outside: what it says, its exit codes, and honest answers to bags that lack something.
+//! `backdrive stability` from the outside: its output, its exit codes, and honest answers to bags that lack something.
 
 mod system;
 
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use system::{Place, file};
 
-/// A short push on the wall by the linear master: fast to run, and its edge is sharp.
+/// A short push on the wall by the linear master: fast to run, and its stability limit is sharp.
 fn record(place: &Place, bag: &str, more: &[&str]) {
     let graph = file("launch/push-and-hold.toml");
     let master = file("plant/models/impulse-engine-linear.toml");
@@ -21,7 +21,7 @@ fn record(place: &Place, bag: &str, more: &[&str]) {
     assert_eq!(done.code, Some(0), "{done:?}");
 }
 
-/// Copies a bag, message by message as `change` leaves them; those for which it says no are left out.
+/// Copies a bag, message by message as `change` leaves them; those that it rejects are left out.
 fn rewrite(from: &Path, to: &Path, mut change: impl FnMut(&str, &mut Message) -> bool) {
     let reader = Reader::open(from).unwrap();
     let header = reader.header().unwrap().clone();
@@ -74,7 +74,7 @@ fn below_and_beyond_the_edge() {
         assert!(low.pointer(key).is_some_and(|v| !v.is_null()), "{key} is missing in {low}");
     }
     assert!(low.get("limit_cycle").is_some_and(Value::is_null) && low["disagreement"].is_array());
-    // Both methods see one edge, and models that are right are not called wrong.
+    // Both methods find one stability limit, and models that are right are not called wrong.
     let (edge, measured) = (number(&low, "/critical_gain"), number(&low, "/methods/frequency/critical_gain"));
     assert!((measured / edge - 1.0).abs() < 0.1, "{edge} and {measured}");
     assert!(!texts(&low, "disagreement").contains("\"model\""), "{}", low["disagreement"]);
@@ -104,7 +104,7 @@ fn the_edge_is_the_loop_s_and_not_the_question_s() {
             assert_eq!(number(found, path), number(&edges[0], path), "{path} at {}", found["gain"]);
         }
     }
-    // What no loop can be asked about ends at once, and says so.
+    // An impossible question for any loop ends at once, and reports this.
     for gain in ["1e-300", "1e300"] {
         let begun = std::time::Instant::now();
         let done = place.backdrive(&["stability", "run.mcap", "--gain", gain]);
@@ -152,10 +152,10 @@ fn a_bag_without_excitation() {
     assert_eq!(found["methods"]["frequency"]["verdict"], "cannot_tell", "{found}");
     assert!(found["methods"]["frequency"]["critical_gain"].is_null());
     assert!(texts(&found, "advice").contains("--dither"), "{found}");
-    // The models are all there and do what was recorded: they are asked, and it is said that only they were.
+    // The models are all there and do what was recorded: they are used, and the output states that only they were.
     assert_eq!((code, found["from"].as_str()), (Some(0), Some("resimulation")));
     assert!(texts(&found, "warnings").contains("not measured"), "{}", found["warnings"]);
-    // Without models that do what was recorded nothing tells.
+    // Without models that do what was recorded there is no evidence.
     let mut step = 0_u64;
     rewrite(&place.path("plain.mcap"), &place.path("strange.mcap"), |topic, message| {
         if let (Message::Sample(sample), "/master/measured_js") = (message, topic) {
@@ -176,7 +176,7 @@ fn bags_that_lack_something() {
     let (_, whole) = ask(&place, "run.mcap", &["--gain", "0.3"]);
     let edge = number(&whole, "/critical_gain");
 
-    // The force on the slave: nothing can be told, and it is said why.
+    // The force on the slave: no answer is possible, and the reason is stated.
     rewrite(&place.path("run.mcap"), &place.path("deaf.mcap"), |topic, _| topic != "/slave/measured_js");
     let done = place.backdrive(&["stability", "deaf.mcap", "--gain", "0.3"]);
     assert!(done.code == Some(3) && done.stderr.contains("F_s") && done.stderr.contains("deaf.mcap"), "{done:?}");
@@ -234,7 +234,7 @@ fn a_force_that_is_clipped() {
     assert_eq!(code, Some(1), "{found}");
     assert_eq!(found["verdict"], "limited", "{found}");
     assert!(!found["methods"]["resimulation"]["limited_from"].is_null(), "{found}");
-    // The headline says where the clamp ends the stable range, and no margin of another limit stands beside it.
+    // The headline states where the clamp ends the stable range, and no margin of another limit stands beside it.
     let (headline, again) = (number(&found, "/limited_from"), number(&found, "/methods/resimulation/limited_from"));
     assert!((headline / again - 1.0).abs() < 0.01, "{found}");
     assert!(found["critical_gain"].is_null() && found["margins"]["phase_deg"].is_null(), "{found}");
@@ -278,7 +278,7 @@ fn an_interrupted_sweep_prints_what_it_has() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Longer than the 5 s after which what has no terminal tells how far it is.
+    // Longer than the 5 s after which a program without a terminal reports its progress.
     std::thread::sleep(std::time::Duration::from_secs(8));
     nix::sys::signal::kill(nix::unistd::Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
     let done = child.wait_with_output().unwrap();

@@ -1,4 +1,4 @@
-//! The frequency-domain answer from recorded signals of the live graph, against the edge that the live graph has.
+//! The frequency-domain answer from recorded signals of the live graph, against the critical gain of the live graph.
 
 mod common;
 

@@ -29,14 +29,14 @@ fn a_stopped_recorder_holds_a_run_up_no_longer_than_a_second() {
     // It took 41 s for 3 s before it was looked at whether a process is stopped.
     assert!(begun.elapsed() < Duration::from_secs(2 + 3) + SLACK, "{:?}: {done:?}", begun.elapsed());
     assert!(done.stderr.contains("`recorder` had been stopped (SIGSTOP); it is continued, so that it can end"), "{done:?}");
-    // Its buffers cover 4096 messages of a topic: it has all of them, or says which are lost.
+    // Its buffers cover 4096 messages of a topic: it has all of them, or reports which are lost.
     assert!(matches!(done.code, Some(0 | 1 | 4 | 7)), "{done:?}");
     let reader = Reader::open(&place.path("run.mcap")).unwrap();
     assert!(reader.ended_cleanly() && reader.damage().is_empty(), "{done:?}");
     place.assert_clean(&runs);
 }
 
-/// Also where every process of the run stands still, so that none says that it is done.
+/// Also where every process of the run stands still, so that none reports that it is done.
 #[test]
 fn a_run_of_which_every_process_is_stopped_ends() {
     let (_alone, place) = (alone(), Place::new());
@@ -51,7 +51,7 @@ fn a_run_of_which_every_process_is_stopped_ends() {
     for node in &nodes {
         assert!(done.stderr.contains(&format!("`{}` had been stopped (SIGSTOP)", node.node)), "{done:?}");
     }
-    // Nothing that was recorded says that the loop was closed to the end.
+    // Nothing in the recording shows that the loop was closed to the end.
     assert!(matches!(done.code, Some(4 | 6 | 7)), "{done:?}");
     assert!(Reader::open(&place.path("run.mcap")).is_ok_and(|r| r.ended_cleanly()), "{done:?}");
     place.assert_clean(&runs);

@@ -16,7 +16,7 @@ fn backdrive(words: &[&str], folder: &Path) -> Output {
 
 fn json(words: &[&str], folder: &Path) -> serde_json::Value {
     let output = backdrive(words, folder);
-    // 7: a slave that is moved all the time never holds still, so nothing is said of its loop.
+    // 7: a slave that is moved all the time never holds still, so its loop is not judged.
     assert!(matches!(output.status.code(), Some(0 | 7)), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -82,7 +82,7 @@ fn a_slave_turns_it() {
     let wanted = [("/slave/measured_js", "position[0]"), ("/slave/measured_js", "effort[0]"), ("/master/measured_js", "effort[0]")];
     let mut found = columns(&temp.path().join("run.mcap"), &wanted);
     let [position, lever, hand] = [0, 1, 2].map(|i| fundamental(&found[i].split_off(10_000), 1.0, 2e-4).unwrap());
-    // What the lever gives back is the device's admittance at this stroke; the servo gives way to friction, so the motion is no pure sine.
+    // The lever returns the device's admittance at this stroke; the servo yields to friction, so the motion is no pure sine.
     let device = Model::load(Path::new(&format!("{ROOT}/plant/models/steering-compensator-sae-10.toml"))).unwrap();
     let resolution = Resolution { steps_per_cycle: 2000, rate_hz: 2000.0, settle_s: 1.0, cycles: 1 };
     let expected = admittance_of(&device, [0, 0], 1.0, position.norm(), &resolution).unwrap();

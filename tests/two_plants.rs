@@ -121,7 +121,7 @@ const NOT_HIDDEN: [&str; 4] = ["bouc_wen", "contact", "hunt_crossley", "preisach
 #[test]
 fn every_element_kind_of_the_stepper_is_known_to_the_hidden_plant() {
     for kind in KINDS {
-        // Parameters may be missing or wrong here: that is said of a kind that is known.
+        // Parameters may be missing or wrong here: that error is about a known kind.
         let told = Network::from_toml(&device("motor", &element(kind.name, ["motor", "ground"], "")), "device").err();
         let told = told.map_or_else(String::new, |error| error.to_string());
         let is_unknown = told.contains("does not know");

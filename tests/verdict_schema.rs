@@ -33,7 +33,7 @@ fn assert_valid(validator: &Validator, text: &str, name: &str) {
     assert_eq!(broken(validator, &again), Vec::<String>::new(), "{name}, written again");
 }
 
-/// Places at which a value says something that another one does not.
+/// Places at which a value has something that another one does not.
 fn lost(from: &Value, to: &Value, at: &str) -> Vec<String> {
     match (from, to) {
         (Value::Object(from), Value::Object(to)) => from

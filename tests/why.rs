@@ -46,7 +46,7 @@ fn a_gain_beyond_the_edge_is_named_and_the_lower_one_stops_it() {
     let remedies = said["remedies"].as_array().unwrap();
     let gain = remedies.iter().find(|r| r["changes"][0]["change"] == "gain" && r["stops"] == true).unwrap();
     let lambda = gain["changes"][0]["lambda"].as_f64().unwrap();
-    // What is said to stop it does so by the commands beside it, as they stand. Where a clamp acts the run says so, and is not called stable.
+    // A proposed remedy works by the commands beside it, as they stand. Where a clamp acts the run reports this, and is not called stable.
     let steps = said["next"].as_array().unwrap();
     let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
     let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
@@ -61,7 +61,7 @@ fn a_gain_beyond_the_edge_is_named_and_the_lower_one_stops_it() {
         }
     }
     assert!(stopped > 0 && said["remedies"][0]["stops"] == true, "{said}");
-    // A remedy that throws the device is not the first, and says that it does.
+    // A remedy that throws the device is not the first, and states that it does.
     let throws: Vec<&Value> = remedies.iter().filter(|r| r["stops"] == true && !r["throws"].is_null()).collect();
     let hand = throws.iter().find(|r| r["changes"][0]["change"] == "estimated_hand").unwrap_or_else(|| panic!("{said}"));
     assert!(said["remedies"][0]["throws"].is_null() && hand["throws"]["beyond_m"].as_f64().unwrap() > 2e-3, "{said}");

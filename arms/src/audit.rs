@@ -1,4 +1,5 @@
-//! What logs of an arm say of themselves before any physics: units, signs, swapped columns and joints, rates that are none, joints that do not move.
+//! Faults that logs of an arm show before any effect is fitted: units, signs, swapped columns and joints, rates that are none, joints that do not
+//! move.
 
 use crate::log::Log;
 use crate::physics::range;
@@ -11,7 +12,7 @@ use backdrive_signal::statistics::rms;
 
 /// A range of a joint that turns that no arm has, rad: degrees read as radians.
 const TURNS: f64 = 12.0;
-/// Share of its usual speed by which a told rate may differ from the derivative of the position.
+/// Share of its usual speed by which a rate from the drive may differ from the derivative of the position.
 const RATE_DIFFERS: f64 = 0.3;
 /// Range of a joint that rests, rad or m.
 const RESTS: f64 = 1e-3;
@@ -83,7 +84,7 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
     }
     let torque = range(logs().flat_map(|l| l.torque[j].iter().copied()));
     if data.is_passive(j) {
-        // It has no motor, and the set says so.
+        // It has no motor, and the set states this.
     } else if rms(logs().flat_map(|l| l.torque[j].iter().copied())) == 0.0 {
         let message = format!(
             "is 0 throughout: the column is empty or another one is meant. If this joint has no motor, say torque = 0 in [joints.{joint}] of set.toml"
@@ -93,7 +94,7 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
         let message = "has the same value throughout: no motor does that while its arm moves; name the column of its torque".to_string();
         out.push(remark("constant", format!("{joint}.torque"), message, Weight::Unusable));
     }
-    // The told rate beside the derivative.
+    // The rate from the drive beside the derivative.
     let (mut off, mut size, mut product, mut own) = (0.0, 0.0, 0.0, 0.0);
     for motion in &data.motions {
         let Some(told) = &motion.told[j] else { continue };
@@ -159,7 +160,7 @@ fn torques_fit(problem: &Problem, data: &Data, out: &mut Vec<Remark>) {
     swapped_positions(problem, data, out);
 }
 
-/// Whether the links' torque goes with the measured one far better where two joints' positions change places.
+/// Whether the links' torque fits the measured one far better where two joints' positions change places.
 fn swapped_positions(problem: &Problem, data: &Data, out: &mut Vec<Remark>) {
     let joints = problem.joints.len();
     let left = |swap: Option<(usize, usize)>| -> f64 {

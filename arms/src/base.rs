@@ -1,7 +1,7 @@
 //! Base parameters: the combinations of inertial parameters that an arm's torque can show.
 //!
 //! By a QR decomposition of the regressor over random states (Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems
-//! 8(4), 1991): a parameter whose column depends on those before it is identifiable only together with them.
+//! 8(4), 1991). A parameter whose column depends on those before it is identifiable only together with them.
 
 use crate::error::ArmError;
 use crate::fit::Fit;
@@ -13,7 +13,7 @@ use crate::rigid::regressor;
 use backdrive_diagnosis::verdict::BaseParameter;
 use nalgebra::{DMatrix, DVector};
 
-/// States that the regressor is looked at in.
+/// States at which the regressor is evaluated.
 const STATES: usize = 60;
 /// Share of a column that counts as nothing.
 const NOTHING: f64 = 1e-8;
@@ -51,7 +51,7 @@ pub fn base(problem: &Problem) -> Result<Vec<Base>, ArmError> {
         .map(|signals| DVector::from_iterator(signals.len() * STATES, signals.iter().flatten().copied()))
         .collect();
     let largest = columns.iter().map(DVector::norm).fold(0.0, f64::max);
-    // From the last body inwards, so that what cannot be told apart is named by the body that is nearer to the base.
+    // From the last body inwards, so that a combination that cannot be separated is named by the body that is nearer to the base.
     let mut orthogonal: Vec<DVector<f64>> = Vec::new();
     let (mut free, mut bound) = (Vec::new(), Vec::new());
     for index in (0..columns.len()).rev() {

@@ -1,9 +1,9 @@
 //! Inertial parameters that bodies can have, nearest to those of a regression.
 //!
 //! The pseudo-inertia of every body has to be positive definite (Wensing, Kim & Slotine, RA-L 3(1), 2018). The fit's own quadratic, in which all other
-//! numbers follow, is minimised with a barrier, the logarithm of the determinants of the pseudo-inertias beside that of the file's bodies: the
-//! log-determinant divergence of Lee, Wensing & Park (Geometric robot dynamic identification, T-RO 36(2), 2020), with a weight so small that it
-//! holds only where the quadratic leaves the cone or does not say.
+//! parameters follow, is minimised with a barrier: the logarithm of the determinants of the pseudo-inertias relative to that of the file's bodies.
+//! This is the log-determinant divergence of Lee, Wensing & Park (Geometric robot dynamic identification, T-RO 36(2), 2020). Its weight is so small
+//! that it acts only where the quadratic leaves the cone or is flat.
 
 use crate::fit::{Fit, Weights};
 use crate::inertial::{COUNT, Parameters, pseudo_inertia};

@@ -28,13 +28,13 @@ pub const EXPERIMENT_FILE: &str = "next-motion.csv";
 /// What may be asked.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Physics that are not considered, by name.
+    /// Effects that are not considered, by name.
     pub without: Vec<String>,
-    /// How many physics may be missing at once, at most.
+    /// How many effects may be missing at once, at most.
     pub effects: usize,
     /// Corner of the regression's filter, Hz, where the motion shall not say it.
     pub corner_hz: Option<f64>,
-    /// Set by whoever interrupts: the search ends with what was found until then, and the verdict says so.
+    /// Set by an interrupt: the search ends with what was found until then, and the verdict states this.
     pub stop: Arc<AtomicBool>,
 }
 
@@ -44,7 +44,7 @@ impl Default for Settings {
     }
 }
 
-/// A physics that was fitted in full in a round of the search.
+/// An effect that was fitted in full in a round of the search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tried {
     /// Its name.
@@ -53,7 +53,7 @@ pub struct Tried {
     pub place: Place,
     /// By how much it raised twice the log evidence.
     pub worth: f64,
-    /// By how much better it predicted stretches that its fit has not seen, in standard errors of that; `None` where that cannot be told.
+    /// By how much better it predicted held-out segments, in standard errors of that; `None` where this is not known.
     pub unseen: Option<f64>,
     /// Whether it was taken up in that round.
     pub taken: bool,
@@ -173,7 +173,7 @@ fn slip_of_whole(whole: &Data, fit: &mut Fit) {
     }
 }
 
-/// Joints whose load hardly changes: friction that grows with it is not told from friction that does not.
+/// Joints whose load hardly changes: load-dependent friction cannot be distinguished from friction that does not depend on load.
 fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
     let remark = |j: usize| {
         Remark {

@@ -1,7 +1,7 @@
 //! Motions of all joints within their limits that show the inertial parameters well.
 //!
-//! A Fourier series for each joint (Swevers, Ganseman, Tükel, De Schutter & Van Brussel, Optimal robot excitation and identification, T-RO 13(5), 1997),
-//! drawn at random, and ranked by the condition of the regressor of the base parameters.
+//! A Fourier series for each joint, drawn at random, and ranked by the condition of the regressor of the base parameters. See Swevers, Ganseman, Tükel,
+//! De Schutter & Van Brussel, Optimal robot excitation and identification, T-RO 13(5), 1997.
 
 use crate::base::{Base, base};
 use crate::error::ArmError;
@@ -18,7 +18,7 @@ const HARMONICS: usize = 5;
 const PERIODS: [f64; 3] = [12.0, 8.0, 24.0];
 /// Series that are drawn.
 const DRAWN: usize = 60;
-/// Samples of a period at which they are looked at first.
+/// Samples of a period at which they are evaluated first.
 const LOOKED_AT: usize = 60;
 /// Rate of the file, Hz.
 pub const RATE: f64 = 100.0;
@@ -114,7 +114,7 @@ fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> M
     };
     for (j, coefficients) in series.iter().enumerate() {
         if problem.is_passive(j) {
-            // It cannot be led along a path. Where the others throw it is not known beforehand, so its own equation does not count here.
+            // It cannot be moved along a prescribed path. Where the others throw it is not known beforehand, so its own equation does not count here.
             let hangs = at_rest(problem, j);
             out.position.push(vec![hangs; count]);
             out.velocity.push(vec![0.0; count]);

@@ -1,9 +1,10 @@
-//! The next experiment: of the motions that were drawn the one that tells most of what the logs leave open, with a known payload where it takes one.
+//! The next experiment: of the motions that were drawn the one with the most information on what the logs leave open, with a known payload where it
+//! takes one.
 //!
 //! A question has an answer, the structure that was found, and a rival. The torque that the answer's own term makes along a motion is what the rival has
-//! to make up for by all its numbers, which are known as well as logs and motion together say. What it cannot make up for, in standard deviations of the
-//! residuals, is the separation (the noncentrality of Atkinson & Fedorov, The design of experiments for discriminating between two rival models,
-//! Biometrika 62(1), 1975, for models that are linear in their numbers).
+//! to compensate with all its parameters, which are known as well as logs and motion together determine them. The part that it cannot compensate, in
+//! standard deviations of the residuals, is the separation. It is the noncentrality of Atkinson & Fedorov (The design of experiments for discriminating
+//! between two rival models, Biometrika 62(1), 1975) for models that are linear in their parameters.
 
 use crate::error::ArmError;
 use crate::excitation::{Excitation, draw};
@@ -19,9 +20,9 @@ use backdrive_diagnosis::words as said;
 use backdrive_plant::robot::Payload;
 use nalgebra::Vector3;
 
-/// Motions that are looked at closely, those that show the inertial parameters best.
+/// Motions that are evaluated in detail, those that show the inertial parameters best.
 const CLOSELY: usize = 12;
-/// Rate at which they are looked at, Hz.
+/// Rate at which they are evaluated, Hz.
 const RATE: f64 = 50.0;
 /// Times that the motion is to be recorded; one of them is held out.
 pub const REPEATS: u32 = 3;
@@ -36,7 +37,7 @@ const ABOVE_LOGS: f64 = 1.5;
 /// What logs leave open.
 #[derive(Debug, Clone)]
 struct Question {
-    /// The terms of the answer that the rival does without, with their numbers.
+    /// The terms of the answer that the rival does without, with their parameters.
     terms: Vec<(Term, Vec<f64>)>,
     /// The rival.
     rival: Structure,
@@ -49,7 +50,7 @@ struct Question {
 pub struct Plan {
     /// The motion.
     pub excitation: Excitation,
-    /// What it tells apart, question by question; empty where nothing is open.
+    /// The pairs that it separates, question by question; empty where nothing is open.
     pub between: Vec<[String; 2]>,
     /// By how much it separates what it separates least, standard deviations, with all that is recorded but one playing.
     pub separation: Option<f64>,
@@ -59,8 +60,8 @@ pub struct Plan {
     pub payload: Option<(usize, Payload)>,
 }
 
-/// Of each joint with friction that is of one level, or in proportion to the load, but not both: the question whether it is the other one, where the logs
-/// do not tell.
+/// For each joint with friction that is of one level, or in proportion to the load, but not both: the question whether it is the other one, where the
+/// logs do not decide it.
 fn of_load(data: &Data, search: &Search) -> Vec<(usize, Question)> {
     let best = &search.best;
     let of_joint = |j: usize| {
@@ -80,7 +81,7 @@ fn of_load(data: &Data, search: &Search) -> Vec<(usize, Question)> {
     (0..data.problem.joints.len()).filter_map(of_joint).collect()
 }
 
-/// Joints at which the logs do not tell friction that grows with the load from friction of one level.
+/// Joints at which the logs do not distinguish load-dependent friction from friction of one level.
 pub fn same_load(data: &Data, search: &Search) -> Vec<usize> {
     of_load(data, search).into_iter().map(|(joint, _)| joint).collect()
 }

@@ -33,11 +33,11 @@ pub struct Weights {
 pub struct Fit {
     /// What was free.
     pub structure: Structure,
-    /// Changes of the inertial parameters in their sizes, then the numbers of the terms in their order.
+    /// Changes of the inertial parameters in their sizes, then the parameters of the terms in their order.
     pub values: Vec<f64>,
     /// Standard errors of the same: the larger one of that of the fit and that of the folds (jackknife).
     pub errors: Vec<f64>,
-    /// Where each term's numbers are in the values.
+    /// Where each term's parameters are in the values.
     pub places: Vec<Range<usize>>,
     /// Residuals of all rows.
     pub residual: Vec<f64>,

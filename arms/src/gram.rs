@@ -1,4 +1,4 @@
-//! What a structure's numbers can make up for: weighted inner products of its columns, and of a torque that it is held against.
+//! The torque that a structure's parameters can explain: weighted inner products of its columns, and of a torque that it is compared with.
 
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::physics::{Physics, Term};
@@ -30,7 +30,7 @@ impl Gram {
         }
     }
 
-    /// The weighted square that the columns cannot make up for.
+    /// The weighted square that the columns cannot explain.
     pub fn left(&self) -> f64 {
         let n = self.cross.len();
         let whole =
@@ -41,7 +41,7 @@ impl Gram {
 }
 
 impl Data<'_> {
-    /// Inner products of a structure's columns and of the torque of some terms with their numbers, the logs counted so many times.
+    /// Inner products of a structure's columns and of the torque of some terms with their parameters, with the given weight of the logs.
     pub fn gram(&self, structure: &Structure, terms: &[(Term, Vec<f64>)], weights: &Weights, times: f64) -> Option<Gram> {
         let (columns, _) = self.all_columns(structure);
         let mut torque = vec![0.0; self.layout.rows];

@@ -71,9 +71,9 @@ pub fn pseudo_inertia(p: &Parameters) -> Matrix4<f64> {
     )
 }
 
-/// Changes of a body's parameters that are as large as each other, in the metric that bodies have whatever frame and unit they are written in: the size of a
-/// change is ½ tr((J⁻¹ δJ)²), with J the pseudo-inertia (Lee & Park, A geometric algorithm for robust multibody inertial parameter identification, RA-L 3(4),
-/// 2018). So a slender link is not easily as stout as a drum, and a rotor's inertia not easily taken for that of a link about its own axis.
+/// Changes of a body's parameters of equal size, in the metric that bodies have whatever frame and unit they are written in. The size of a change is ½
+/// tr((J⁻¹ δJ)²), with J the pseudo-inertia (Lee & Park, A geometric algorithm for robust multibody inertial parameter identification, RA-L 3(4), 2018). So a
+/// slender link is not easily as stout as a drum, and a rotor's inertia not easily taken for that of a link about its own axis.
 ///
 /// `size`: that of a change of each parameter where the body is half as heavy again; thinner than a tenth of its extent no body is taken to be.
 pub fn basis(p: &Parameters, size: &Parameters) -> Basis {

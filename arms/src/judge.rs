@@ -21,9 +21,10 @@ const SETTLING: f64 = 0.5;
 /// Share of its speed that the loop may take of a body within a sample: beyond 2 it would swing up.
 const MOST_A_SAMPLE: f64 = 0.5;
 
-/// Gains of the loop at each joint, N m/rad and N m s/rad: critically damped at 4 Hz at most on what the joint weighs while the others are free, in the pose where that is least (a loop that is
-/// stable there is so everywhere), and no stiffer than the rotor alone bears, which is all that it holds while a gear with play is between its flanks. The models that are compared have
-/// the same loop, that of the one with most in it. `None` where the model is no arm.
+/// Gains of the loop at each joint, N m/rad and N m s/rad. The loop is critically damped at 4 Hz at most with the joint's inertia while the others are
+/// free. The pose is that of least inertia, because a loop that is stable there is stable everywhere. Loop gains are also limited by the rotor inertia
+/// alone, because the link is decoupled inside the backlash. The models that are compared have the same loop, that of the one with most in it. `None`
+/// where the model is no arm.
 pub fn gains(data: &Data, model: &Model) -> Option<Vec<[f64; 2]>> {
     let arm = model.arm.as_ref()?;
     let period = data.rates.period();
@@ -48,7 +49,7 @@ fn rotor_of(data: &Data, model: &Model, joint: usize) -> Option<usize> {
 }
 
 /// Root mean square of the loop's torque at each joint over the held-out logs (or all, where none is held out), as a share of the rms of the measured
-/// torque, with these [`gains`], one of each joint; `None` where the model cannot be simulated.
+/// torque. The loop has these [`gains`], one of each joint; `None` where the model cannot be simulated.
 pub fn judge(data: &Data, model: &Model, reading: &Reading, gains: &[[f64; 2]]) -> Option<Vec<f64>> {
     let joints = data.problem.joints.len();
     let held_out = data.fit_count..data.motions.len();
@@ -115,7 +116,7 @@ pub const AGAINST: f64 = 1.05;
 /// What the loop adds with and without a term that a search has added, as shares of the rms torque, by joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// Without it, all other numbers fitted again.
+    /// Without it, all other parameters refitted.
     pub without: Vec<f64>,
     /// With it.
     pub with: Vec<f64>,
@@ -138,7 +139,7 @@ pub fn each(data: &Data, search: &Search, gains: &[[f64; 2]], with: Option<&Vec<
             // The logged torque is late, not the arm.
             Physics::Delay => false,
             Physics::CoupledFriction => term.shape.first() == Some(&-1.0),
-            // How heavy the motor before a gear is, nobody says, and the loop acts on that.
+            // The inertia of the motor before a gear is not known, and the loop acts on that.
             Physics::Compliance | Physics::Backlash => term.at.joint().is_some_and(|j| data.problem.armature[j] > 0.0),
             _ => true,
         };

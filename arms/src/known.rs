@@ -52,8 +52,8 @@ impl Data<'_> {
         gravity.max(rms(inertia))
     }
 
-    /// What a joint's torque is compared with: its rms over the logs for fitting (or those held out), N m or N. A joint without a motor has none, and its
-    /// equation is compared with the torque of gravity or of its inertia.
+    /// The reference of a joint's torque: its rms over the logs for fitting (or those held out), in N m or N (prismatic).
+    /// A joint without a motor has none, and its equation is compared with the torque of gravity or of its inertia.
     pub fn scale(&self, joint: usize, held_out: bool) -> f64 {
         self.passive[joint].unwrap_or_else(|| self.mean_square(&self.torque, joint, held_out).sqrt())
     }

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-/// Folds of the blocks: so many times a part of the logs is left out of a fit and predicted.
+/// Folds of the blocks: the number of times that a part of the logs is left out of a fit and predicted.
 const FOLDS: usize = 8;
 /// Blocks in which predictions are compared, at most, over all logs.
 const BLOCKS: usize = 48;
 
-/// Rows of a motion and a joint are neighbours; this says where.
+/// Rows of a motion and a joint are neighbours; this holds their places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// First row and number of rows of a joint, of each motion.
@@ -24,7 +24,7 @@ impl Layout {
         Layout { motions: Vec::new(), joints, rows: 0 }
     }
 
-    /// Adds a motion with so many rows for each joint.
+    /// Adds a motion with this number of rows for each joint.
     pub fn push(&mut self, count: usize) {
         self.motions.push((self.rows, count));
         self.rows += count * self.joints;

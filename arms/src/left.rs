@@ -1,6 +1,6 @@
-//! What remains of each joint's torque by a fit: how much of it the sensors' noise explains, and what it goes with.
+//! The residual torque of each joint after a fit: how much of it the sensors' noise explains, and what it correlates with.
 //!
-//! Only rows in which the joint moves count: at rest dry friction is anything between its levels, and says nothing of a law.
+//! Only rows in which the joint moves count: at rest dry friction is anything between its levels, and does not determine a law.
 
 use crate::fit::Fit;
 use crate::log::Log;
@@ -18,11 +18,11 @@ pub const MUCH: f64 = 0.05;
 pub const ABOVE_NOISE: f64 = 2.0;
 /// Multiple of the filter's own correlation time from which on what remains is called slow.
 const SLOW: f64 = 2.0;
-/// Share of what remains that has to follow a state of the arm for this to be told.
+/// Share of the residual that has to follow a state of the arm for this to be reported.
 const FOLLOWS: f64 = 0.4;
 /// Classes of a state, within each of which the mean is taken.
 const CLASSES: usize = 6;
-/// Poses in which the inertia is looked at.
+/// Poses in which the inertia is evaluated.
 const POSES: usize = 10;
 
 /// What remains at one joint.
@@ -55,8 +55,8 @@ pub fn left(data: &Data, fit: &Fit) -> Vec<Left> {
 
 /// Standard deviation of what the sensors' noise leaves in the rows of each joint, N m or N.
 ///
-/// The torque's own is taken from differences of its samples, the positions' from their steps; both as white noise through the filters of the regression,
-/// positions twice differentiated and times the inertia that the joint feels.
+/// The torque's own is taken from differences of its samples, the positions' from their steps. Both are propagated as white noise through the filters of
+/// the regression, positions twice differentiated and times the inertia that the joint feels.
 fn noise(data: &Data, motions: Range<usize>) -> Vec<f64> {
     let joints = data.problem.joints.len();
     let logs: Vec<&Log> = data.problem.fit.iter().chain(&data.problem.held_out).collect();
@@ -240,7 +240,7 @@ mod tests {
         assert!(explained(&follows, &signal, 2000.0) > 0.8);
         let other: Vec<f64> = even(2100).split_off(100);
         assert!(explained(&other, &signal, 2000.0).abs() < 0.02);
-        // Of too few independent samples nothing is told.
+        // With too few independent samples nothing is reported.
         assert_eq!(explained(&follows, &signal, 10.0), 0.0);
     }
 }

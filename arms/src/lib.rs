@@ -1,9 +1,9 @@
 //! Which joint of an arm does what its model leaves out, from logs of position, velocity and torque of every joint.
 //!
 //! [`problem::Problem`] is a model with a robot and its logs. [`diagnose::diagnose`] regresses the measured torque on the torque that the measured motion
-//! takes ([`regression`]: inertial parameters, friction and the rest, all through the same filter), searches for the physics that predicts stretches of the
-//! logs that its fit has not seen ([`search`]), simulates the arm in closed loop with and without it ([`judge`]), and says what follows in the same
-//! verdict file as a diagnosis of one axis ([`verdict`]).
+//! takes ([`regression`]: inertial parameters, friction and the rest, all through the same filter). It searches for the effects that predict held-out
+//! segments of the logs ([`search`]), and simulates the arm in closed loop with and without them ([`judge`]). The result is the same verdict file as for a
+//! diagnosis of one axis ([`verdict`]).
 //!
 //! How it works and where it should not be trusted: docs/arms.md, "Diagnosis of an arm".
 

@@ -18,7 +18,7 @@ pub struct Log {
     pub t: Vec<f64>,
     /// Coordinates, rad or m.
     pub position: Vec<Vec<f64>>,
-    /// Rates as the drive told them, rad/s or m/s; `None` where they were not logged.
+    /// Rates from the drive, rad/s or m/s; `None` where they were not logged.
     pub velocity: Vec<Option<Vec<f64>>>,
     /// Torques or forces of the motors seen at the joints, N m or N.
     pub torque: Vec<Vec<f64>>,
@@ -26,7 +26,7 @@ pub struct Log {
     pub payload: Option<(usize, Payload)>,
 }
 
-/// Where each joint stands in the files: as the set says, else by headings that are usual.
+/// Where each joint is in the files: from the set, else by headings that are usual.
 ///
 /// # Errors
 /// Where the set names a joint that the robot does not have, leaves one out, or no usual heading is there.
@@ -129,7 +129,7 @@ fn is_bag(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
 }
 
-/// Reads the joints' signals of a file, CSV or bag; what is wrong is told with the joint's key in the set.
+/// Reads the joints' signals of a file, CSV or bag; errors name the joint's key in the set.
 fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Result<Recording, ArmError> {
     let signals: Vec<(String, String)> = joints.iter().flat_map(keys_of).collect();
     let names: Vec<&str> = signals.iter().map(|(signal, _)| signal.as_str()).collect();

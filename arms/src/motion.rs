@@ -1,8 +1,8 @@
 //! Logs on an even grid, low-passed without delay, with derivatives: what a regression sees.
 //!
 //! Positions go through a zero-phase Butterworth and are differentiated there. Every regressor and the torque then go through a second, lower one (the
-//! "parallel filtering" of Gautier, Dynamic identification of robots with power model, ICRA 1997), so that what the filter takes off is the same on both
-//! sides, and one sample in several is kept.
+//! "parallel filtering" of Gautier, Dynamic identification of robots with power model, ICRA 1997). The filter then removes the same on both sides, and
+//! one sample in several is kept.
 
 use crate::log::Log;
 use backdrive_plant::model::Hold;
@@ -35,9 +35,9 @@ pub struct Rates {
     pub position_corner: f64,
     /// Corner of the filter of torque and regressors, Hz.
     pub corner: f64,
-    /// One sample of the grid in so many is used for computing.
+    /// One in this number of samples of the grid is used for computing.
     pub thinned: usize,
-    /// One of those in so many is kept as a row of the regression.
+    /// One in this number of those is kept as a row of the regression.
     pub kept: usize,
 }
 
@@ -107,7 +107,7 @@ pub struct Motion {
     pub acceleration: Vec<Vec<f64>>,
     /// Torque through the filter of the positions, N m or N.
     pub torque: Vec<Vec<f64>>,
-    /// Rates as the drive told them, through the same filter.
+    /// Rates from the drive, through the same filter.
     pub told: Vec<Option<Vec<f64>>>,
     /// 1 while a joint moves, 0 where it hardly does: dry friction is then anything between its levels, and a regression learns nothing of it.
     pub moves: Vec<Vec<f64>>,
@@ -185,7 +185,7 @@ fn frequency_below(samples: &[f64], rate: f64) -> f64 {
     power_below(samples, rate, SHARE)
 }
 
-/// The frequency below which a share of the power about the mean lies, Hz; 0 of what is too short to tell.
+/// The frequency below which a share of the power about the mean lies, Hz; 0 for a signal that is too short.
 pub(crate) fn power_below(samples: &[f64], rate: f64, share: f64) -> f64 {
     if samples.len() < 16 {
         return 0.0;

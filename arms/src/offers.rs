@@ -5,7 +5,7 @@ use crate::fit::{Fit, Structure, Weights};
 use crate::physics::{Physics, Term};
 use crate::regression::Data;
 
-/// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
+/// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which is not known better.
 pub const LEAST_PAYLOAD: f64 = 0.15;
 /// The least displacement of presliding, in times what the sensor resolves.
 pub const PRESLIDING: f64 = 8.0;
@@ -33,7 +33,7 @@ pub(crate) fn is_possible(data: &Data, fit: &Fit) -> bool {
             (None, Physics::Payload) => LEAST_PAYLOAD * last,
             (None, _) => 0.0,
         };
-        // Presliding over less is a direction that turns at once, for all that the sensor can tell.
+        // Presliding over less is a direction that turns at once, within the resolution of the sensor.
         let is_sharp = term.physics == Physics::Presliding
             && term.given.is_none()
             && term.at.joint().is_some_and(|j| term.shape.first().is_some_and(|d| *d < PRESLIDING * data.first_slip(j)));
@@ -79,7 +79,7 @@ pub(crate) fn without_term(data: &Data, fit: &Fit, index: usize, weights: &Weigh
     data.fit(&without(&fit.structure, index), weights)
 }
 
-/// Candidates by what they promise beside a structure, each physics and place once, with the best of its shapes.
+/// Candidates by what they promise beside a structure, each effect and place once, with the best of its shapes.
 pub(crate) fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) -> Vec<(Term, f64)> {
     let Some((system, values)) = data.system(structure, weights) else { return Vec::new() };
     let mut out: Vec<(Term, f64)> = Vec::new();
@@ -118,7 +118,7 @@ pub(crate) fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> 
         return best;
     }
     if matches!(term.physics, Physics::Compliance | Physics::Backlash) {
-        // The shape that the number says, as long as that is better.
+        // The shape that follows from the fitted value, while that is better.
         for _ in 0..4 {
             let mut structure = best.structure.clone();
             let value = best.values[best.places[index].start];
@@ -179,7 +179,7 @@ pub(crate) fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
     best
 }
 
-/// The tolerance of the inertial parameters that is worth its numbers.
+/// The fit with the tolerance of the inertial parameters that has the best score.
 pub(crate) fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
     let others = (0..=data.most_tolerance).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
     others.fold(fit.clone(), |best, other| if other.score < best.score - 1e-9 { other } else { best })

@@ -1,4 +1,4 @@
-//! The physics that a joint may have, each as columns of the regression.
+//! The effects that a joint may have, each as columns of the regression.
 
 use crate::motion::{Motion, Rates};
 use crate::problem::Problem;
@@ -8,7 +8,7 @@ use backdrive_diagnosis::hypothesis::Family;
 use backdrive_plant::robot::Tree;
 use backdrive_signal::statistics::rms;
 
-/// A physics that a search can add to an arm.
+/// An effect that a search can add to an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Physics {
     /// Viscous friction.
@@ -35,7 +35,7 @@ pub enum Physics {
     Inertia,
     /// Torque that is read by a wrong factor (torque constant), at a joint or at all.
     Gain,
-    /// A joint whose zero is not where its sensor says.
+    /// A joint whose zero differs from that of its sensor.
     Offset,
     /// A mass at the last link.
     Payload,
@@ -53,7 +53,7 @@ pub enum Physics {
     Backlash,
 }
 
-/// Everything that is known of a physics.
+/// Everything that is known of an effect.
 pub struct Facts {
     /// Name in verdicts: an element kind, the key of a signal, or one that only arms have.
     pub name: &'static str,
@@ -63,7 +63,7 @@ pub struct Facts {
     pub family: Family,
     /// Whether its first number may not be below 0.
     pub positive: bool,
-    /// Numbers that it adds to a fit, those of its shape too.
+    /// Parameters that it adds to a fit, those of its shape too.
     pub numbers: usize,
 }
 
@@ -122,7 +122,7 @@ impl Physics {
     }
 }
 
-/// Where a physics acts.
+/// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum At {
     /// At a joint.
@@ -143,7 +143,7 @@ impl At {
     }
 }
 
-/// A physics at a place, with the numbers in which the torque is not linear.
+/// An effect at a place, with the parameters in which the torque is not linear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// What.
@@ -163,7 +163,7 @@ impl Term {
         Term { physics, at, shape, given: None }
     }
 
-    /// Whether another one is the same physics at the same place.
+    /// Whether another one is the same effect at the same place.
     pub fn is_like(&self, other: &Term) -> bool {
         self.physics == other.physics && self.at == other.at
     }
@@ -198,8 +198,8 @@ pub struct Sight<'a> {
     pub slip: &'a [f64],
 }
 
-/// Direction of dry friction that a motion has, -1 to 1: it turns over a displacement, and stays while the joint rests (an elasto-plastic spring whose
-/// deflection ends at `displacement`; of one Maxwell element as in Lampaert, Swevers & Al-Bender 2002).
+/// Direction of dry friction along a motion, -1 to 1: it turns over a displacement, and stays while the joint rests. It is an elasto-plastic spring
+/// whose deflection ends at `displacement`, with one Maxwell element as in Lampaert, Swevers & Al-Bender 2002.
 pub fn direction(position: impl Iterator<Item = f64>, displacement: f64) -> Vec<f64> {
     let (mut state, mut before): (f64, Option<f64>) = (0.0, None);
     position
@@ -274,7 +274,7 @@ impl Sight<'_> {
                 let before = |i: usize| term.shape.get(i).copied().unwrap_or(0.0);
                 sideways.iter().enumerate().map(|(i, s)| plus(all(s, 1.0), down, -0.5 * before(i))).collect()
             }
-            // As it was measured: the motor carries the other joint's friction too.
+            // The measured torque: the motor carries the other joint's friction too.
             Physics::Coupling => one(motion.torque[other].clone()),
             Physics::CoupledFriction => {
                 let ratio = shape(0);
@@ -312,7 +312,7 @@ pub fn several_payloads(motions: &[Motion]) -> bool {
     motions.windows(2).any(|pair| pair[0].payload != pair[1].payload)
 }
 
-/// Every physics at every place, with the shapes that a search tries first.
+/// Every effect at every place, with the shapes that a search tries first.
 pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
     let joints = problem.joints.len();
     let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! A model with a robot, and the logs that it is held against.
+//! A model with a robot, and the logs that it is compared with.
 
 use crate::error::ArmError;
 use crate::inertial::Bodies;

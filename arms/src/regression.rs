@@ -397,8 +397,8 @@ impl Data<'_> {
         (rows as f64 / weights.time[joint]).max(4.0)
     }
 
-    /// Twice the negative log evidence, but for a constant: `Σ n_j ln(mean square_j)` with independent rows `n_j`; of the inertial parameters, whose prior
-    /// is known, the exact Gaussian factor `δᵀ P δ + ln det(H) - ln det(P)`; of all other numbers `ln(Σ n_j)` each (Schwarz 1978).
+    /// Twice the negative log evidence, except for a constant: `Σ n_j ln(mean square_j)` with independent rows `n_j`. The inertial parameters, whose prior
+    /// is known, add the exact Gaussian factor `δᵀ P δ + ln det(H) - ln det(P)`; all other parameters add `ln(Σ n_j)` each (Schwarz 1978).
     fn score(&self, fit: &Fit, weights: &Weights) -> f64 {
         let joints = 0..self.layout.joints;
         let total: f64 = joints.clone().map(|j| self.independent(weights, j)).sum();
@@ -432,8 +432,8 @@ impl Data<'_> {
         schur.cholesky().map_or(0.0, |c| right.dot(&c.solve(&right)))
     }
 
-    /// The weighted squared residual (with the prior) as a quadratic of the inertial parameters alone, in their sizes, all other numbers following:
-    /// its matrix and where it is least.
+    /// The weighted squared residual (with the prior) as a quadratic of the inertial parameters alone, in their sizes, with all other parameters
+    /// optimal: its matrix and its minimum.
     pub fn quadratic(&self, structure: &Structure, weights: &Weights) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (system, values) = self.system(structure, weights)?;
         let n = self.inertial.len();
@@ -450,7 +450,7 @@ impl Data<'_> {
         Some((own - cross * solved, at))
     }
 
-    /// A fit whose inertial parameters are set, in their sizes; all other numbers are fitted again. Standard errors stay those of the fit.
+    /// A fit whose inertial parameters are set, in their sizes; all other parameters are refitted. Standard errors stay those of the fit.
     pub fn fit_beside(&self, fit: &Fit, inertial: &[f64], weights: &Weights) -> Option<Fit> {
         let (columns, _) = self.all_columns(&fit.structure);
         let n = self.inertial.len();

@@ -1,9 +1,9 @@
-//! What a verdict says in sentences.
+//! The sentences of a verdict.
 
 use crate::judge::AGAINST;
 use backdrive_diagnosis::verdict::{ArmJoint, ArmPart, Finding, Remaining, Where, Word};
 
-/// What is left over, and at which joint most.
+/// The remaining residual, and the joint at which it is largest.
 pub(crate) fn remaining(arm: &ArmPart) -> Remaining {
     let of = |f: fn(&ArmJoint) -> f64| arm.joints.iter().map(|j| f(j).powi(2)).sum::<f64>().sqrt();
     let share = |x: f64| (of(|j| j.refit) > 0.0).then(|| x / of(|j| j.refit));
@@ -86,7 +86,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
     }
 }
 
-/// A physics of an arm in words.
+/// An effect of an arm in words.
 pub fn words(name: &str) -> String {
     crate::physics::ALL.iter().map(|p| p.facts()).find(|f| f.name == name).map_or_else(|| name.replace('_', " "), |f| f.words.to_string())
 }

@@ -1,4 +1,4 @@
-//! The search: what has to be added to the nominal model, one physics after the other, each judged by stretches of the logs that its fit has not seen.
+//! The search: what has to be added to the nominal model, one effect after the other, each judged by held-out segments of the logs.
 
 use crate::consistent::consistent;
 use crate::error::ArmError;
@@ -10,19 +10,19 @@ use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Physics that are added at most, those not counted that every joint has.
+/// Effects that are added at most, without those that every joint has.
 pub const MOST: usize = 8;
 /// Candidates that are fitted in full in each round, those that promise most.
 const FITTED: usize = 10;
-/// The same of what inertial parameters can make up for, where they are free.
+/// The same for effects that inertial parameters can compensate, where they are free.
 const FITTED_BESIDE: usize = 3;
 /// Which of [`TOLERANCES`] is that of a file that somebody made with care.
 const STATED: usize = 1;
-/// By how much the information criterion has to fall for a physics to be taken up. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
+/// By how much the information criterion has to fall for an effect to be added. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
 const WORTH: f64 = 10.0;
-/// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
+/// The least share of the mean squared residual of held-out segments, at the joint where it shows most, that an effect has to explain.
 pub const LEAST_SHARE: f64 = 0.03;
-/// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
+/// The least share of the rms torque of a joint, that where it shows most, that an effect has to be.
 pub const LEAST_TORQUE: f64 = 0.01;
 
 /// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
@@ -53,16 +53,16 @@ pub struct Search {
     pub weights: Weights,
     /// What was tried, in order.
     pub tried: Vec<Tried>,
-    /// Of each added term of the best structure: how much better the model with it predicts unseen stretches than one without it.
+    /// For each added term of the best structure: how much better the model with it predicts held-out segments than one without it.
     pub gains: Vec<Option<Gain>>,
     /// Of each added term: what could stand in its place, with the score of that structure above the best one's.
     pub rivals: Vec<Vec<Rival>>,
-    /// Of each added term that inertial parameters could make up for: the score, above the best one's, of the structure without it and with its bodies as free as is
-    /// worth it.
+    /// For each added term that inertial parameters could compensate: the score, above the best one's, of the structure without it and with its bodies as free
+    /// as is worth it.
     pub freed: Vec<Option<f64>>,
 }
 
-/// Another structure, with a term in the place of one that was found.
+/// Another structure, with a term instead of one that was found.
 #[derive(Debug, Clone)]
 pub struct Rival {
     /// The term.
@@ -73,11 +73,11 @@ pub struct Rival {
     pub structure: Structure,
 }
 
-/// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most; `stop`: set by whoever interrupts,
-/// which ends the search with what was found until then.
+/// Looks for what is missing. `without`: names of effects that are not considered; `most`: effects that are added at most; `stop`: set by an interrupt, which
+/// ends the search with what was found until then.
 ///
-/// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file: a law that is missing is no measurement of
-/// a mass, and the friction of a joint without a motor is known only in the size of its inertia.
+/// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file. The residual of a missing law does not
+/// measure a mass, and the friction of a joint without a motor is known only in the size of its inertia.
 ///
 /// # Errors
 /// Where a fit cannot be computed at all.
@@ -184,7 +184,7 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
     Some(weights)
 }
 
-/// Mean squared unseen residuals by block, weighted over the joints, in lists of neighbours.
+/// Mean squared held-out residuals by block, weighted over the joints, in lists of neighbours.
 pub fn by_block(data: &Data, residual: &[f64], weights: &Weights, held_out: bool) -> Vec<Vec<f64>> {
     let motions = if held_out { data.fit_count..data.motions.len() } else { 0..data.fit_count };
     let of_block = |block: &crate::layout::Block| -> f64 {
@@ -204,14 +204,14 @@ pub fn compare(data: &Data, base: &Fit, better: &Fit, weights: &Weights) -> Opti
     gain(&by_block(data, &base.unseen, weights, false), &by_block(data, &better.unseen, weights, false))
 }
 
-/// The largest share of the mean squared unseen residual of a joint that one fit takes off another.
+/// The largest share of the mean squared held-out residual of a joint that one fit removes from another.
 pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
     (0..data.problem.joints.len())
         .map(|j| 1.0 - data.mean_square(&better.unseen, j, false) / data.mean_square(&base.unseen, j, false).max(f64::MIN_POSITIVE))
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Physics that every joint has more or less of: they take no other's place.
+/// Effects that every joint has more or less of: they take no other's place.
 const COMMON: [Physics; 4] = [Physics::Coulomb, Physics::Damper, Physics::Bias, Physics::Inertia];
 
 /// Terms that a search has added and that not every joint has.
@@ -234,7 +234,7 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
         let promising = |structure: &Structure| ranked(data, pool, structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0);
         let mut terms: Vec<Term> = promising(&best.structure).take(FITTED).map(|(term, _)| term).collect();
         if best.structure.tolerance > STATED {
-            // What bodies as free as these make up for shows where they are as the file has them.
+            // The effects that bodies this free compensate are visible where the bodies are those of the file.
             let stated = Structure { tolerance: STATED, ..best.structure.clone() };
             let hidden = promising(&stated).map(|(term, _)| term).filter(|t| is_like_bodies(t.physics)).take(FITTED_BESIDE);
             terms.extend(hidden.filter(|t| !terms.contains(t)).collect::<Vec<_>>());
@@ -245,11 +245,11 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
             }
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
             let index = fit.structure.terms.len() - 1;
-            // Beside some physics the file's inertial parameters are better, beside others worse than alone.
+            // Beside some effects the file's inertial parameters are better, beside others worse than alone.
             let fit = tolerated(data, shaped(data, fit, index, weights), weights);
             let mut fit = tolerated(data, shaped(data, fit, index, weights), weights);
             if term.physics == Physics::Coulomb {
-                // Over which displacement it turns is no physics of its own.
+                // The displacement over which it turns is no effect of its own.
                 fit = slipped(data, fit, weights);
             }
             if is_possible(data, &fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
@@ -288,7 +288,8 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
     }
 }
 
-/// Of fits with one more term each, the best first: brings to the front the one with the fewest numbers that unseen stretches do not surely set back.
+/// Of fits with one more term each, the best first: brings to the front the one with the fewest parameters that held-out segments do not surely
+/// reject.
 fn simplest_first(data: &Data, offers: &mut [Fit], weights: &Weights) {
     let Some(best) = offers.first().cloned() else { return };
     let numbers = |f: &Fit| f.structure.terms.last().map_or(0, |t| t.physics.facts().numbers);
@@ -299,13 +300,13 @@ fn simplest_first(data: &Data, offers: &mut [Fit], weights: &Weights) {
     }
 }
 
-/// Whether a fit with fewer numbers predicts unseen stretches as well as another one, for all that they say.
+/// Whether a fit with fewer parameters predicts held-out segments as well as another one, within their uncertainty.
 fn is_as_good(data: &Data, simple: &Fit, other: &Fit, weights: &Weights) -> bool {
     let sure = compare(data, simple, other, weights).is_some_and(|g| g.is_sure());
     largest_share(data, simple, other) < LEAST_SHARE || (!sure && simple.score < other.score + WORTH)
 }
 
-/// Puts another physics in the place of one that was added, where that is better.
+/// Replaces an added effect by another, where that is better.
 fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     for _ in 0..2 {
         let mut changed = false;
@@ -344,7 +345,7 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                 *best = offer;
                 changed = true;
             }
-            // One exchange a place and round: two that are as good as each other would take turns for ever.
+            // One exchange a place and round: two that are equally good would alternate for ever.
             index += 1;
             if index >= best.structure.terms.len() {
                 break;
@@ -356,13 +357,13 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     }
 }
 
-/// Whether inertial parameters, freed, can make up for a physics.
+/// Whether released inertial parameters can compensate an effect.
 fn is_like_bodies(physics: Physics) -> bool {
     matches!(physics, Physics::Payload | Physics::Inertia)
 }
 
-/// Of a term that is mass or inertia: by how much the structure without it scores above the best one where its bodies are freed to make up for it. They predict
-/// the same, and only what is known of bodies speaks for the term.
+/// For a term that is mass or inertia: by how much the structure without it scores above the best one where its bodies are released to compensate it. They
+/// predict the same, and only what is known of bodies speaks for the term.
 fn freed(data: &Data, best: &Fit, index: usize, weights: &Weights) -> Option<f64> {
     best.structure.terms.get(index).filter(|t| is_like_bodies(t.physics))?;
     let less = without_term(data, best, index, weights)?;
@@ -394,13 +395,13 @@ fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
     }
 }
 
-/// The nominal structure with its numbers refitted, inertial parameters as free as is worth it.
+/// The nominal structure with its parameters refitted, inertial parameters as free as is worth it.
 fn refitted(data: &Data, nominal: &Structure, slip: &[f64], weights: &Weights) -> Option<Fit> {
     let fit = data.fit(&Structure { slip: slip.to_vec(), ..nominal.clone() }, weights)?;
     Some(tolerated(data, fit, weights))
 }
 
-/// What could stand in the place of an added term, with the score above the best one's.
+/// What could replace an added term, with the score above the best one's.
 fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weights) -> Vec<Rival> {
     let less = without(&best.structure, index);
     let pool: Vec<Term> = pool.iter().filter(|t| !t.is_like(&best.structure.terms[index])).cloned().collect();

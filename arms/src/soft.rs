@@ -23,7 +23,7 @@ pub(crate) const DAMPING: f64 = 0.1;
 const STOP_HZ: f64 = 50.0;
 /// See [`STOP_HZ`].
 const STOP_DAMPING: f64 = 0.5;
-/// Up to which share of the link's resonance its lag is followed: nearer to it all depends on a damping that nobody knows.
+/// Up to which share of the link's resonance its lag is followed: nearer to it everything depends on an unknown damping.
 const BELOW: f64 = 0.6;
 /// Rounds in which the torque that passes through the gear follows the link; each leaves less than a half of what the one before left.
 const ROUNDS: usize = 4;

@@ -1,6 +1,6 @@
 //! Elements of the nominal model that the regression has no terms for: their torque along the measured motion, with the parameters that the file states.
 //!
-//! A law of the path alone, however much it remembers, needs no fit: a body is led along the motion by the stepper, and what that takes is the element's torque.
+//! A law of the path alone, with any memory, needs no fit: the stepper moves a body along the motion, and the torque for that is the element's torque.
 
 use crate::motion::Motion;
 use backdrive_plant::elements::Law;

@@ -162,13 +162,13 @@ impl System {
             let jackknife = folds.iter().map(|f| (f[i] - mean).powi(2)).sum::<f64>() * (k - 1.0).max(0.0) / k.max(1.0);
             errors.push(variance[i].max(jackknife).max(0.0).sqrt());
         }
-        // Numbers of a shape were searched, and are no columns.
+        // Parameters of a shape were searched, and are no columns.
         let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(shape_numbers).sum();
         Some((errors, numbers + searched as f64, covariance))
     }
 }
 
-/// Numbers of a term in which the torque is not linear, where they are searched.
+/// Parameters of a term in which the torque is not linear, where they are searched.
 fn shape_numbers(term: &Term) -> usize {
     match term.physics {
         Physics::Stribeck | Physics::Presliding | Physics::Cogging | Physics::Compliance | Physics::Backlash => 1,

@@ -1,4 +1,4 @@
-//! Which samples of the logged torque may be used, and at which joints: clipped torque is left out, and torque without its sign says nothing of a joint.
+//! Which samples of the logged torque may be used, and at which joints: clipped torque is left out, and a joint's torque without its sign is not used.
 
 use crate::log::Log;
 use crate::motion::{Motion, Rates};
@@ -70,7 +70,7 @@ pub fn leave_out(motion: &mut Motion, log: &Log, clipped: &[&Clipped], rates: &R
 }
 
 /// By joint: whether its torque was logged without its sign. It never has one of the two signs while the joint moves both ways, and it comes to 0 and goes no
-/// further: to 0 exactly, or next to it where the links need torque of both signs. `load`: torque of the links along each motion.
+/// further. It reaches 0 exactly, or nearly where the links need torque of both signs. `load`: torque of the links along each motion.
 pub fn unsigned(logs: &[&Log], motions: &[Motion], load: &[Signals], joints: usize) -> Vec<bool> {
     let of_joint = |joint: usize| {
         let torque = || logs.iter().flat_map(|log| log.torque[joint].iter().copied());

@@ -1,4 +1,4 @@
-//! What a search says, in the form of the verdict file.
+//! The result of a search, in the form of the verdict file.
 
 use crate::base;
 use crate::error::ArmError;
@@ -38,7 +38,7 @@ pub struct Parts<'a> {
     pub audit: Vec<Remark>,
     /// Torque that a loop has to add, by the refitted nominal and by the diagnosed model.
     pub loops: [Option<Vec<f64>>; 2],
-    /// Of each added term what a simulation says of it.
+    /// The result of a simulation for each added term.
     pub judged: Vec<Option<Judged>>,
     /// What to record next.
     pub next: Option<NextExperiment>,
@@ -149,7 +149,8 @@ fn estimate(value: f64, error: f64, unit: &str) -> Parameter {
     Parameter::One(Estimate { value, ci95, at_bound: false, unit: unit.to_string() })
 }
 
-/// The findings, those first whose absence would cost unseen stretches most, and last what a simulation speaks against; friction of one level and its excess at a joint are one finding.
+/// The findings, those first whose absence would increase the error of held-out segments most, and last those that a simulation contradicts. Friction of one
+/// level and its excess at a joint are one finding.
 fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Finding> {
     let best = &search.best;
     let indices = added(&best.structure);
@@ -176,7 +177,7 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
         let found = search.gains.get(order).copied().flatten();
         let mut sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
         if let Some(above) = search.freed.get(order).copied().flatten() {
-            // Unseen stretches may say nothing here: freed bodies predict the same.
+            // Held-out segments may not decide here: released bodies predict the same.
             let by_bodies = 1.0 / (1.0 + (-0.5 * above).exp());
             if by_bodies > sure {
                 sure = by_bodies.min(MASSES_SURE);
@@ -348,7 +349,7 @@ fn numbers(data: &Data, fit: &Fit, index: usize) -> BTreeMap<String, Parameter> 
     }
 }
 
-/// Numbers of the nominal model that moved beyond their interval: elements, armatures, base parameters stay in the arm's own part.
+/// Parameters of the nominal model that moved beyond their interval: elements, armatures, base parameters stay in the arm's own part.
 fn moved(data: &Data, search: &Search) -> BTreeMap<String, Moved> {
     let best = &search.best;
     let mut out = BTreeMap::new();

@@ -23,7 +23,7 @@ pub struct Reading {
     pub gain: Vec<f64>,
     /// Joint, other joint, ratio.
     pub coupling: Vec<(usize, usize, f64)>,
-    /// By joint, rad or m: what the sensor says too much.
+    /// By joint, rad or m: the sensor's offset.
     pub offset: Vec<f64>,
     /// By joint: whether the position is that of a motor whose gear gives way.
     pub of_motor: Vec<bool>,
@@ -129,7 +129,7 @@ fn is_urdf(xml: &str) -> bool {
     backdrive_plant::robot::RobotFile::is_urdf(xml)
 }
 
-/// Numbers of terms at a joint: the sum of the first value of each of this physics, in torques of the joint.
+/// Parameters of terms at a joint: the sum of the first value of each of this effect, in torques of the joint.
 fn at_joint(fit: &Fit, reading: &Reading, joint: usize, physics: Physics) -> Option<(f64, Term, usize)> {
     let (index, term) = fit.structure.terms.iter().enumerate().find(|(_, t)| t.physics == physics && t.at == At::Joint(joint))?;
     Some((fit.values[fit.places[index].start] / reading.gain[joint], term.clone(), index))
@@ -145,7 +145,7 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         let value = |physics| at_joint(fit, reading, joint, physics).map(|f| f.0);
         let second = |physics| at_joint(fit, reading, joint, physics).map(|f| fit.values[fit.places[f.2].start + 1] / reading.gain[joint]);
         let shape = |physics| at_joint(fit, reading, joint, physics).and_then(|f| f.1.shape.first().copied());
-        // What the regression knows is written anew: elements of the nominal file that are the same physics give way.
+        // Effects of the regression are written with new values: elements of the nominal file that are the same effect are replaced.
         let known: Vec<usize> =
             problem.given.iter().filter(|g| g.joint == joint && !parts_of(&g.law).is_empty()).map(|g| g.element).collect();
         let names: Vec<String> = known.iter().filter_map(|i| problem.model.elements.get(*i)).map(|e| e.name.clone()).collect();
@@ -164,7 +164,7 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         let gives_way = compliance.is_some() || gap.is_some();
         if gives_way {
             on = rotor(model, joint, body, &problem.joints[joint], &Gear { compliance, gap }, notes);
-            // What the drive tells is its own position.
+            // The drive measures its own position.
             for output in &mut model.outputs {
                 match &mut output.kind {
                     OutputKind::Position(of) | OutputKind::Velocity(of) if *of == body => *of = on,

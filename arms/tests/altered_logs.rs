@@ -1,4 +1,4 @@
-//! Logs that are not what they say: each is told in a sentence that names the column.
+//! Logs that differ from their description: each is reported in a sentence that names the column.
 
 mod common;
 
@@ -45,7 +45,7 @@ fn a_log_that_is_right_has_no_remark() {
 fn degrees_for_radians_are_told() {
     let all = remarks("", |c| c[1].iter_mut().for_each(|q| *q = q.to_degrees()));
     assert!(says(&all, &["shoulder.position", "looks like degrees", "unit = \"deg\""]), "{all:?}");
-    // ... and read as such where the set says so.
+    // ... and read as such where the set states it.
     let joints = "[joints.shoulder]\nposition = { column = \"q1\", unit = \"deg\" }\ntorque = \"tau1\"\n[joints.elbow]\nposition = \"q2\"\ntorque = \"tau2\"\n";
     assert_eq!(remarks(joints, |c| c[1].iter_mut().for_each(|q| *q = q.to_degrees())), Vec::<String>::new());
 }

@@ -46,7 +46,7 @@ fn dry_friction_is_named_at_its_joint() {
     assert_eq!(finding.place, Place::Between("elbow".to_string(), "ground".to_string()));
     let (value, low, high) = number(finding, "force");
     assert!((value - 0.3).abs() < 0.01 && low < 0.3 && 0.3 < high + 0.003, "{value} {low} {high}");
-    // In closed loop, with sticking as it is, it helps too, and the file that is written has it.
+    // In closed loop, with the simulated sticking, it helps too, and the file that is written has it.
     let arm = found.verdict.arm.as_ref().unwrap();
     let elbow = &arm.joints[1];
     assert!(elbow.loop_diagnosed.unwrap() < 0.5 * elbow.loop_refit.unwrap(), "{elbow:?}");

@@ -1,4 +1,4 @@
-//! The motion that is planned tells what the logs leave open, and a payload that is said counts.
+//! The planned motion determines what the logs leave open, and a stated payload counts.
 
 mod common;
 
@@ -65,7 +65,7 @@ fn friction_under_one_load_is_left_open_and_the_planned_motion_tells() {
     let plan = planned(&first);
     assert!(plan.separation_sd.unwrap() > 4.0, "{plan:?}");
     assert!(plan.between.iter().any(|b| b.contains("grows with the load") && b.contains("shoulder")), "{plan:?}");
-    // Done as it says.
+    // Done by its description.
     let path = tracked(&first.experiment);
     let count = (200.0 * plan.duration_s.unwrap()) as i32;
     for (seed, name) in ["d.csv", "e.csv", "f.csv"].iter().enumerate() {
@@ -111,7 +111,7 @@ fn a_payload_that_is_said_tells_torque_constants_from_masses() {
     assert_eq!((gain.physics.as_str(), &gain.place), ("gain", &Place::Signal("torque of all joints".to_string())));
     let Parameter::One(e) = &gain.parameters["gain"] else { panic!("{gain:?}") };
     assert!((e.value - 1.15).abs() < 0.02, "{gain:?}");
-    // With the payload passed over in silence masses and torque constants are one, and no file's numbers are right.
+    // If the payload is not stated, masses and torque constants have one common factor, and no file's parameters are right.
     std::fs::write(folder.path().join("set.toml"), "model = \"arm.toml\"\nfit = [\"d.csv\", \"e.csv\"]\nheld_out = [\"f.csv\"]\n").unwrap();
     let silent = diagnose(&Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap(), &Settings::default()).unwrap();
     assert_ne!(silent.verdict.word, Word::NothingMissing);

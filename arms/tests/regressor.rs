@@ -1,4 +1,4 @@
-//! The regressor is the inverse dynamics, and knows which parameters can be told apart.
+//! The regressor is the inverse dynamics, and finds which parameters can be separated.
 
 mod common;
 
@@ -51,12 +51,12 @@ fn a_planar_arm_of_two_joints_has_six_base_parameters() {
     let problem = problem();
     let all = base(&problem).unwrap();
     assert_eq!(all.len(), 6, "{:?}", all.iter().map(|b| b.name()).collect::<Vec<_>>());
-    // Whatever goes with a base parameter changes no torque: moved along the combination, the regressor sees nothing.
+    // A change along the combination of a base parameter changes no torque.
     let motion = motion();
     let columns = regressor(&problem.robot, &problem.bodies, &motion, &[]).unwrap();
     for b in &all {
         for (with, factor) in &b.with {
-            // One more of the dependent parameter is like so much more of each base parameter that it goes with.
+            // A unit more of the dependent parameter is equivalent to its coefficient more of each base parameter that contains it.
             let of_all: Vec<(usize, f64)> =
                 all.iter().filter_map(|o| o.with.iter().find(|(i, _)| i == with).map(|(_, f)| (o.of, *f))).collect();
             assert!(factor.abs() > 0.0);

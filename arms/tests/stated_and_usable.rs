@@ -31,7 +31,7 @@ fn found(folder: &Path) -> Found {
     diagnose(&problem(folder), &Settings::default()).unwrap()
 }
 
-/// Findings as physics and place.
+/// Findings as effect and place.
 fn claims(found: &Found) -> Vec<(String, Place)> {
     found.verdict.findings.iter().map(|f| (f.physics.clone(), f.place.clone())).collect()
 }
@@ -307,7 +307,8 @@ fn a_joint_without_a_motor_is_diagnosed_by_its_equation() {
     let text = std::fs::read_to_string(place.join("set.toml")).unwrap();
     std::fs::write(place.join("set.toml"), text + joints).unwrap();
     let found = found(place);
-    // What moves the elbow is the shoulder's motion, so its friction is not always told from the shoulder's torque constant; it is named in any case.
+    // The shoulder's motion moves the elbow, so its friction cannot always be distinguished from the shoulder's torque constant; it is named in any
+    // case.
     assert!(found.verdict.sentence.contains("viscous friction at the elbow"), "{}", found.verdict.sentence);
     let elbow = &found.verdict.arm.as_ref().unwrap().joints[1];
     assert!(elbow.diagnosed < 0.05 && elbow.loop_diagnosed.is_none_or(|share| share < 0.5), "{elbow:?}");

@@ -3,8 +3,8 @@
 //! `BACKDRIVE_PYTHON=target/venv/bin/python cargo bench -p backdrive-bags --bench beside_python` (tests/run makes target/venv).
 //!
 //! 500 000 samples of one axis on five topics, CDR `sensor_msgs/msg/JointState`. Ours: from the first push to the end of `finish`, encoding included, and
-//! every message read and decoded. Python: the payloads are ready when writing begins (lz4, chunks of 1 MiB), and reading is without decoding,
-//! then with it. Each three times by turns; the median is told.
+//! every message read and decoded. Python: the payloads are ready when writing begins (lz4, chunks of 1 MiB), and reading is without decoding, then with
+//! it. Each runs three times, alternately; the median is reported.
 
 use backdrive_bags::{BagHeader, Reader, Recorder, RecorderOptions, TopicInfo, WhenFull, info};
 use backdrive_msgs::topic::{Kind, Topic};

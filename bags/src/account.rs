@@ -1,4 +1,4 @@
-//! What a bag holds, counted message by message, beside what it says of itself. The messages win: a record that they deny is reported.
+//! The content of a bag, counted message by message, and compared with the bag's own records. The messages win: a record that they deny is reported.
 //!
 //! Every verb that reads a bag asks here whether it is whole, so that all of them give the same answer.
 
@@ -26,7 +26,7 @@ pub enum Fault {
         /// How many there should be.
         of: u64,
     },
-    /// It ends before its graph does, and its recorder left no record that says why.
+    /// It ends before its graph does, and its recorder left no record of the cause.
     Short {
         /// Steps in it.
         steps: u64,
@@ -42,7 +42,7 @@ pub enum Fault {
         /// Where and how.
         what: String,
     },
-    /// It says something of itself that its messages deny, or two things that exclude each other.
+    /// Its own records contradict its messages, or each other.
     Contradiction {
         /// What.
         what: String,
@@ -82,7 +82,7 @@ pub struct Account {
     pub empty_steps: u64,
     /// What forbids calling it whole; empty where nothing does.
     pub faults: Vec<Fault>,
-    /// What it says of itself that is wrong, and costs nothing.
+    /// Errors in its own records that have no consequences.
     pub notes: Vec<String>,
     /// Whether the rate in its metadata is none, or not that of its messages.
     pub rate_is_denied: bool,
@@ -124,7 +124,7 @@ impl Account {
     }
 }
 
-/// What a graph says of its run.
+/// The run as a graph plans it.
 #[derive(Default)]
 struct Plan {
     rate_hz: Option<f64>,
@@ -146,7 +146,7 @@ const RATE_OF_REALTIME: f64 = 0.2;
 const RATE_OF_LOCKSTEP: f64 = 1e-3;
 /// Steps beyond this are not marked one by one.
 const MOST_MARKED: u64 = 1 << 27;
-/// As many of a topic's last messages are remembered, to tell a repetition from another message of the same number.
+/// Number of a topic's last messages that are remembered, to distinguish a repetition from another message of the same number.
 const REMEMBERED: usize = 64;
 
 /// What is known of a topic while its messages go by.

@@ -1,4 +1,5 @@
-//! What an Arrow schema in a parquet file says that the file's own types do not: which whole numbers are durations. Of the schema (a FlatBuffer, in base64) no more is read.
+//! Content of an Arrow schema in a parquet file that the file's own types lack: which integers are durations. Of the schema (a FlatBuffer, in base64) no more
+//! is read.
 
 use std::collections::HashMap;
 

@@ -19,7 +19,7 @@ pub struct Schema {
 #[derive(Debug, Clone, PartialEq)]
 enum Form {
     Cdr,
-    /// It says itself what it holds: there are no types.
+    /// The message itself describes its content: there are no types.
     Json,
     Protobuf(ProtobufType),
 }
@@ -59,7 +59,7 @@ impl Schema {
         }
     }
 
-    /// Where a message says when it was made; `None` where it cannot.
+    /// The field with the time at which a message was made; `None` where there is none.
     pub fn stamp(&self) -> Option<FieldPath> {
         let path = match &self.form {
             Form::Protobuf(of) => of.stamp()?,
@@ -91,7 +91,7 @@ impl Schema {
 
     /// Finds a field by its path.
     ///
-    /// Errors: a sentence that says what there is instead.
+    /// Errors: a sentence that names what there is instead.
     pub fn find(&self, path: &str) -> Result<FieldPath, String> {
         match &self.form {
             Form::Cdr => {}
@@ -284,7 +284,7 @@ impl Schema {
         }
         match of {
             Type::Message(inner) => {
-                // A type of no size must not be skipped four thousand million times because a damaged length says so.
+                // A type of no size must not be skipped four thousand million times because of a damaged length.
                 let fields = &self.types[inner];
                 let times = if fields.is_empty() { 0 } else { times };
                 for _ in 0..times {

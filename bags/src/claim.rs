@@ -1,4 +1,4 @@
-//! A file that is about to be written: nobody else's, and nothing in it that was not given up.
+//! A file that is about to be written: no other writer has it, and it holds nothing that was not given up.
 
 use crate::BagError;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-/// Opens a file for a bag, empty and locked for as long as it is open: a second writer is refused, whatever it was told.
+/// Opens a file for a bag, empty and locked while it is open: a second writer is refused, whatever its options.
 ///
 /// A file that holds something is replaced only with `overwrite`, and only if it is a bag. What is no regular file (a
 /// device, a pipe) is refused: a bag is written at several places and read again at the end. Errors: [`BagError::Exists`], [`BagError::InUse`], [`BagError::Create`].
@@ -63,7 +63,7 @@ pub(crate) fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
     }
 }
 
-/// Why a device or a pipe takes no bag: what it says itself where it takes nothing at all, such as `/dev/full`.
+/// Why a device or a pipe takes no bag: its own error where it takes nothing at all, such as `/dev/full`.
 fn no_file(path: &Path, mut file: File, kind: std::fs::FileType) -> BagError {
     let refused = if kind.is_char_device() { file.write_all(&[0]).err() } else { None };
     let why = "it is a device or a pipe, and what is written there cannot be read again; name a file";
@@ -80,7 +80,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     path.parent().filter(|f| !f.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
-/// The same error without the name of a temporary file, which nobody knows.
+/// The same error without the name of a temporary file, which means nothing to a user.
 pub(crate) fn nameless(error: &std::io::Error) -> std::io::Error {
     error.raw_os_error().map_or_else(|| std::io::Error::from(error.kind()), std::io::Error::from_raw_os_error)
 }

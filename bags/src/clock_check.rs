@@ -1,10 +1,10 @@
-//! What is wrong with the times of a recording that can be used all the same.
+//! What is wrong with the times of a recording that can be used nevertheless.
 
 /// A step that is longer than this many usual ones is a jump: samples are missing. The Python package has the same limits.
 const MISSING: f64 = 1.5;
 /// A step that differs from the usual one by more than this share of it is uneven.
 const UNEVEN: f64 = 0.05;
-/// Steps are told to be uneven where more than this share of them is.
+/// Steps are reported as uneven where more than this share of them is.
 const UNEVEN_SHARE: f64 = 0.01;
 
 /// What is wrong with a clock.

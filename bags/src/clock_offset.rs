@@ -1,8 +1,8 @@
-//! What a bag says of the clocks of several hosts.
+//! A bag's records of the clocks of several hosts.
 
 use std::fmt;
 
-/// Kind of the events that tell it; their text is a [`ClockOffset`].
+/// Kind of the events that hold it; their text is a [`ClockOffset`].
 pub const CLOCK_OFFSET: &str = "clock_offset";
 
 /// Wall clock of one host against another's.

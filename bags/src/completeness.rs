@@ -51,7 +51,7 @@ pub struct TopicCompleteness {
     /// Messages that came behind one with a higher sequence number.
     #[serde(default)]
     pub backward: u64,
-    /// Times the publisher began to count anew.
+    /// Number of times that the publisher restarted its count.
     #[serde(default)]
     pub restarts: u64,
     /// Step of the first message.

@@ -29,7 +29,7 @@ pub struct DiffReport {
     pub only_in_b: Vec<String>,
     /// Topics left out.
     pub ignored: Vec<String>,
-    /// Stamps were not compared, because they tell the time of day in a realtime bag.
+    /// Stamps were not compared, because they are times of day in a realtime bag.
     pub stamps_ignored: bool,
     /// Where the bags part: the earliest of all first divergences, with its topic.
     pub first: Option<(String, Divergence)>,

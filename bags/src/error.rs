@@ -13,7 +13,7 @@ pub enum BagError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// Its message.
         source: std::io::Error,
     },
     /// It cannot be written, or not created.
@@ -21,7 +21,7 @@ pub enum BagError {
     Create {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's message.
         source: std::io::Error,
     },
     /// What is there already was not given up.
@@ -54,7 +54,7 @@ pub enum BagError {
         /// What is wrong with it.
         what: String,
     },
-    /// A message does not hold what its topic says.
+    /// A message does not have the content that its topic requires.
     #[error("{}, byte {offset}, {topic}: {source}", path.display())]
     Message {
         /// The file.
@@ -122,7 +122,7 @@ pub enum BagError {
         /// What is wrong, and what there is.
         what: String,
     },
-    /// A file does not hold what it should; `what` tells where in it.
+    /// A file does not have the content that it should; `what` gives the place in it.
     #[error("{}: {what}", path.display())]
     File {
         /// The file.

@@ -12,7 +12,7 @@ thread_local! {
 /// Runs a decoder. It must not leave anything half changed that is used after an error.
 ///
 /// # Errors
-/// What its panic said.
+/// The message of its panic.
 pub(crate) fn guarded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -89,7 +89,7 @@ impl Frames {
         Ok(Some(frame))
     }
 
-    /// The body of a record, as far as it is in the file.
+    /// The body of a record, up to the end of the file.
     pub(crate) fn body(&mut self, frame: &Frame) -> Result<Vec<u8>, BagError> {
         self.seek(frame.offset + PREFIX)?;
         let mut body = vec![0; frame.len as usize];

@@ -1,4 +1,4 @@
-//! What a bag says about the run that it holds.
+//! A bag's description of the run that it holds.
 
 use crate::BagError;
 use crate::number_type::NumberType;
@@ -52,7 +52,7 @@ pub struct TopicInfo {
 pub struct BagHeader {
     /// One line for a person; may be empty.
     pub title: String,
-    /// The graph file, as it was run.
+    /// The graph file of the run.
     pub graph_toml: String,
     /// Models, grips and whatever else the graph names, as used: name and text. They become attachments.
     pub files: Vec<(String, String)>,

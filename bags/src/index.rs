@@ -1,12 +1,12 @@
-//! Which messages a chunk holds, in few bytes: what stands behind every chunk of ours in the place of MCAP's message index.
+//! Which messages a chunk holds, in few bytes: it stands behind every chunk of ours instead of MCAP's message index.
 //!
-//! MCAP's own index takes 16 bytes a message, half of a lockstep bag whose messages compress to as much. What is needed of it here,
-//! the log time of every message by channel and place, grows nearly evenly: of the second differences most are zero in lockstep, and
-//! the others take two or three bytes in real time. They stand in a record of type [`COMPACT_INDEX`], which the format reserves for
-//! applications and other readers pass over (<https://mcap.dev/spec>, "Opcodes 0x80-0xFF"). [`crate::recover()`] reads it when a chunk is damaged.
+//! MCAP's own index takes 16 bytes a message, half of a lockstep bag whose messages compress to as much. The information needed here, the log time of
+//! every message by channel and place, grows nearly evenly. Most of its second differences are zero in lockstep, and the others take two or three
+//! bytes in real time. They stand in a record of type [`COMPACT_INDEX`], which the format reserves for applications and other readers pass over
+//! (<https://mcap.dev/spec>, "Opcodes 0x80-0xFF"). [`crate::recover()`] reads it when a chunk is damaged.
 //!
-//! Body: a version byte, then for each channel its number (u16), how many messages (u32), bytes that follow (u32), and there the second
-//! differences, zigzag (<https://protobuf.dev/programming-guides/encoding>) in base 128; a zero is followed by how many more come after it.
+//! Body: a version byte, then for each channel its number (u16), how many messages (u32), bytes that follow (u32), and there the second differences.
+//! These are zigzag (<https://protobuf.dev/programming-guides/encoding>) in base 128; a zero is followed by how many more come after it.
 
 use std::collections::BTreeMap;
 

@@ -54,7 +54,7 @@ pub struct BagInfo {
     pub damage: Option<String>,
     /// What forbids calling it whole: losses, damage, contradictions. Empty where nothing does.
     pub faults: Vec<Fault>,
-    /// What it says of itself that is wrong, and costs nothing.
+    /// Errors in its own records that have no consequences.
     pub notes: Vec<String>,
     /// Whether every message and its checksum was read; otherwise all this is what stands at the end of the file.
     pub read_whole: bool,
@@ -84,9 +84,9 @@ pub struct TopicSummary {
 /// Sums a bag up from what stands at its end, without reading its messages: in the same time whatever its size. Damage among the
 /// messages is not seen, for which see [`check`].
 ///
-/// A bag is read whole, as by [`check`], where its end does not stand for its messages: it was not closed, others wrote it without statistics or
-/// indices, or wrote a bag of ours again, or its recorder's record and its statistics count differently.
-/// Errors: it cannot be read or is no MCAP file.
+/// A bag is read whole, as by [`check`], where its end does not represent its messages. Reasons are: it was not closed, others wrote it without
+/// statistics or indices, or rewrote a bag of ours, or its recorder's record and its statistics have different counts. Errors: it cannot be read or
+/// is no MCAP file.
 pub fn info(path: &Path) -> Result<BagInfo, BagError> {
     let Some((reader, spans)) = Reader::of_summary(path)? else { return check(path) };
     if !end_is_believed(&reader) {
@@ -110,7 +110,7 @@ pub fn info(path: &Path) -> Result<BagInfo, BagError> {
     Ok(sum_up(&reader, heard))
 }
 
-/// Whether what a bag of ours says at its end stands for its messages.
+/// Whether the records at the end of a bag of ours represent its messages.
 fn end_is_believed(reader: &Reader) -> bool {
     let Some(header) = reader.header() else { return true };
     let Some(record) = reader.completeness() else { return false };

@@ -61,7 +61,7 @@ impl JsonMessage {
         JsonMessage(value)
     }
 
-    /// Paths of its numbers, at most so many.
+    /// Paths of numeric fields, at most this many.
     pub(crate) fn numbers(&self, most: usize) -> Vec<String> {
         let mut found = Vec::new();
         list(&self.0, String::new(), most, &mut found, 0);

@@ -1,12 +1,12 @@
-//! Lengths inside the body of a record, looked at before the body is parsed: the crate `mcap` makes room for what a length says before it reads.
+//! Lengths inside the body of a record, checked before the body is parsed: the crate `mcap` allocates the stated length before it reads.
 
 use mcap::records::op;
 
 /// What stands in a record up to its last counted part, field by field.
 enum Field {
-    /// So many bytes.
+    /// This number of bytes.
     Fixed(usize),
-    /// A length of four bytes, and so many bytes.
+    /// A length of four bytes, and that number of bytes.
     Counted,
     /// The same, and in it pairs of counted strings.
     Pairs,

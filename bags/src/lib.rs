@@ -1,9 +1,9 @@
 //! Bags: MCAP files in which every message of a run is, and that any ROS 2 tool opens.
 //!
-//! [`Recorder`] writes one while a graph runs, on a thread of its own; [`Reader`] reads one, whoever
-//! wrote it and however it ended. Around them: [`info()`] sums a bag up, [`recover()`] saves what a killed
-//! recorder left behind, [`diff()`] compares two bags, [`merge()`] joins those of several hosts, [`signals()`] picks the columns of a recording,
-//! [`import_table`], [`import_lerobot`] and [`import_rosbag`] take recordings of other formats, [`export_table`] and [`export_lerobot`] write them, and [`play()`] sends a bag's messages again.
+//! [`Recorder`] writes one while a graph runs, on a thread of its own; [`Reader`] reads one, whoever wrote it and however it ended. Around them: [`info()`]
+//! sums a bag up, [`recover()`] saves what a killed recorder left behind, [`diff()`] compares two bags, [`merge()`] joins those of several hosts, and
+//! [`signals()`] picks the columns of a recording. [`import_table`], [`import_lerobot`] and [`import_rosbag`] take recordings of other formats,
+//! [`export_table`] and [`export_lerobot`] write them, and [`play()`] sends a bag's messages again.
 //!
 //! Payloads are CDR with ros2msg schemas whatever the live transport was; the graph, the models and a
 //! verdict on completeness are in the file.

@@ -23,7 +23,7 @@ impl Memory {
         self.limit.saturating_sub(self.used.get())
     }
 
-    /// Takes `bytes` of what is left.
+    /// Takes `bytes` of the remaining memory.
     ///
     /// # Errors
     /// A sentence with the size and the limit.

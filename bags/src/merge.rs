@@ -1,9 +1,8 @@
 //! One bag from those that several hosts recorded of the same run.
 //!
-//! Every host records every topic, so most messages are in both bags: one copy is kept, the one that was recorded first
-//! by a common clock, which is that of the host that sent it. What only one of them heard is kept too, so that the
-//! merged bag is as complete as all of them together. Log times are told in the first bag's clock: what the bags say of
-//! the clocks (events of kind [`CLOCK_OFFSET`]) is applied at the time nearest to each message.
+//! Every host records every topic, so most messages are in both bags. One copy is kept, the one that was recorded first by a common clock, which is
+//! that of the host that sent it. What only one of them heard is kept too, so that the merged bag is as complete as all of them together. Log times
+//! are in the first bag's clock: the clock records of the bags (events of kind [`CLOCK_OFFSET`]) are applied at the time nearest to each message.
 
 use crate::account::{Account, Fault};
 use crate::claim::not_itself;
@@ -45,8 +44,8 @@ type Key = (usize, u32, u64, i64);
 /// `offset_s` is by how much the second bag's clock is ahead, in place of what the bags say.
 ///
 /// # Errors
-/// A bag cannot be read or is none of a run, they are of different graphs, or in real time neither says what the clocks
-/// were and `offset_s` is not given; `to` exists or cannot be written.
+/// A bag cannot be read or is none of a run, or they are of different graphs. In real time neither has records of the clocks and `offset_s` is not
+/// given. `to` exists or cannot be written.
 pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, overwrite: bool) -> Result<MergeReport, BagError> {
     not_itself(first, to)?;
     not_itself(second, to)?;
@@ -55,7 +54,7 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
     let wrong =
         |path: &Path, key: &'static str, what: String| BagError::Metadata { path: path.to_owned(), record: crate::header::RUN, key, what };
     let accounts = [Account::of(&a)?, Account::of(&b)?];
-    // A rate that the messages deny says nothing of which run it is.
+    // A rate that the messages contradict does not identify the run.
     let rates = [(head, &accounts[0]), (other, &accounts[1])].map(|(head, account)| match (account.rate_is_denied, account.rate_hz) {
         (true, Some(found)) => found,
         _ => head.rate_hz,

@@ -1,10 +1,10 @@
 //! Puts messages that arrive in any order into the order (step, topic, sequence), so that a lockstep bag is the
 //! same however the machine ran.
 //!
-//! A step is complete when every sample topic has delivered it. Sparse topics (events, gains, status) cannot be waited
-//! for: but what a node says in step k it sends before its sample of step k + 1, so at the second checkpoint after
-//! the samples of step k + 1 are here, it has arrived too. Nothing waits without bound: when a topic falls silent for
-//! [`STALL`], or [`MOST_HELD`] messages wait, what is held is let go in order and the silent topic is no longer waited for.
+//! A step is complete when every sample topic has delivered it. Sparse topics (events, gains, status) cannot be waited for. But a node sends its
+//! sparse messages of step k before its sample of step k + 1. At the second checkpoint after the samples of step k + 1 are here, they have therefore
+//! arrived too. Nothing waits without bound: when a topic falls silent for [`STALL`], or [`MOST_HELD`] messages wait, the held messages are released
+//! in order and the silent topic is no longer waited for.
 
 use backdrive_msgs::Message;
 use std::collections::BTreeMap;
@@ -36,13 +36,13 @@ pub(crate) struct Order {
     topics: Vec<Progress>,
     held: Ordered,
     arrivals: u64,
-    /// Every step below it has been let go.
+    /// Every step below it has been released.
     floor: u64,
     /// What was complete at the last checkpoint.
     ready: u64,
     /// The last watermark, and when it moved.
     moved: (u64, Duration),
-    /// Messages that came when their step had been let go.
+    /// Messages that came when their step had been released.
     pub(crate) late: u64,
 }
 
@@ -84,7 +84,7 @@ impl Order {
         dense.unwrap_or_else(|| self.topics.iter().map(|topic| topic.upto).max().unwrap_or(0))
     }
 
-    /// Says that every topic has been asked for its messages since the last checkpoint, and takes what may go to the file.
+    /// Marks that every topic has been asked for its messages since the last checkpoint, and takes what may go to the file.
     ///
     /// `now` is any steadily growing time.
     pub(crate) fn checkpoint(&mut self, now: Duration) -> Ordered {

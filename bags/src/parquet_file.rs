@@ -1,4 +1,4 @@
-//! Columns of numbers out of a parquet file. The format is the crate's; what its types mean to a recording is told here.
+//! Columns of numbers out of a parquet file. The crate defines the format; this file maps its types to a recording.
 
 use crate::BagError;
 use crate::arrow_schema::durations;
@@ -22,7 +22,7 @@ pub(crate) struct ParquetFile {
     reader: SerializedFileReader<File>,
     /// Of columns that are durations, which parquet has no type for, how many of their units make a second.
     durations: HashMap<String, f64>,
-    /// What its numbers may take.
+    /// Memory that the numbers may take.
     memory: Rc<Memory>,
 }
 
@@ -38,7 +38,7 @@ pub(crate) enum Values {
     Other(&'static str),
 }
 
-/// The stored values of a column, one after the other, with the levels that tell which rows they are of.
+/// The stored values of a column, one after the other, with the levels that assign them to rows.
 #[derive(Default)]
 struct Stored {
     numbers: Numbers,
@@ -76,7 +76,7 @@ impl ParquetFile {
         Ok(file)
     }
 
-    /// What the reader takes on trust: that columns lie within the file and have as many values as it says.
+    /// What the reader takes on trust: that columns lie within the file and have the stated number of values.
     fn check_extents(&self, size: u64) -> Result<(), BagError> {
         for group in self.reader.metadata().row_groups() {
             for column in group.columns() {
@@ -217,7 +217,7 @@ impl ParquetFile {
     }
 }
 
-/// Rows that are read between two looks at the memory: a damaged file may hold more values than it says.
+/// Rows that are read between two checks of the memory: a damaged file may hold more values than stated.
 const BATCH: usize = 1 << 16;
 
 /// All values of a column in a row group, behind what is there.
@@ -323,7 +323,7 @@ fn half(bytes: &[u8]) -> f64 {
     if bits >> 15 == 1 { -size } else { size }
 }
 
-/// What the crate says, without the name of its kind of error.
+/// The crate's message, without the name of its kind of error.
 fn told(error: &ParquetError) -> String {
     match error {
         ParquetError::General(what) | ParquetError::NYI(what) | ParquetError::EOF(what) => what.clone(),

@@ -35,7 +35,7 @@ pub(crate) enum Values<'a> {
 /// Rows that are compressed together.
 const GROUP: usize = 1 << 20;
 
-/// Writes columns of equal length, with what else is said of the file. The compression is Snappy, which every reader has.
+/// Writes columns of equal length, with the other entries about the file. The compression is Snappy, which every reader has.
 pub(crate) fn write(out: &Path, columns: &[Written], said: &[(&str, String)]) -> Result<(), BagError> {
     let file = File::create_new(out).map_err(BagError::create(out))?;
     let failed = |error: ParquetError| BagError::Write { name: out.display().to_string(), what: error.to_string() };

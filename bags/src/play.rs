@@ -65,7 +65,7 @@ pub struct PlayReport {
 
 /// Plays a bag in the order of its file. A message whose log time lies before that of one already sent is sent at once.
 ///
-/// Errors: a rate that is not above 0, a topic that is not there, a damaged bag, what the sink says.
+/// Errors: a rate that is not above 0, a topic that is not there, a damaged bag, an error of the sink.
 pub fn play(reader: &Reader, options: &PlayOptions, sink: &mut dyn Sink) -> Result<PlayReport, BagError> {
     if options.rate.is_nan() || options.rate <= 0.0 {
         return Err(BagError::Usage(format!("a playback rate of {} is not above 0", options.rate)));
@@ -99,7 +99,7 @@ pub fn play(reader: &Reader, options: &PlayOptions, sink: &mut dyn Sink) -> Resu
     Ok(report)
 }
 
-/// When a message is due that lies so many seconds after the beginning.
+/// When a message is due that lies this number of seconds after the beginning.
 fn due(after_s: f64, rate: f64) -> Duration {
     Duration::try_from_secs_f64(after_s / rate).unwrap_or(Duration::MAX)
 }

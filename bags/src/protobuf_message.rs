@@ -1,4 +1,4 @@
-//! Messages in protobuf, by the descriptors in the bag's schema: each becomes what the same message is in JSON, and its numbers are found by the same paths.
+//! Messages in protobuf, by the descriptors in the bag's schema: each becomes its JSON equivalent, and numbers are found by the same paths.
 
 use crate::foreign_code::guarded;
 use crate::json_message::JsonMessage;
@@ -15,7 +15,7 @@ const MOST_NESTED: usize = 16;
 /// Types of a time; their fields are seconds and nanoseconds.
 const TIMES: [&str; 2] = ["google.protobuf.Timestamp", "google.protobuf.Duration"];
 
-/// Where a message says when it was made, of these the first that it has.
+/// Fields with the time at which a message was made; the first that it has counts.
 const STAMPS: [&str; 3] = ["header.stamp", "timestamp", "stamp"];
 
 /// The type of a topic's messages.
@@ -56,7 +56,7 @@ impl ProtobufType {
     /// Whether a path can be one.
     ///
     /// # Errors
-    /// A sentence that says what there is instead.
+    /// A sentence that names what there is instead.
     pub(crate) fn check(&self, path: &str) -> Result<(), String> {
         let (mut message, mut rest) = (self.0.clone(), path);
         loop {
@@ -97,7 +97,7 @@ impl ProtobufType {
         }
     }
 
-    /// The path of the time at which a message says that it was made; `None` where the type has none.
+    /// The path of the time at which a message was made; `None` where the type has none.
     pub(crate) fn stamp(&self) -> Option<&'static str> {
         STAMPS.into_iter().find(|path| self.check(path).is_ok())
     }
@@ -115,7 +115,7 @@ fn object(message: &DynamicMessage, nested: usize) -> Json {
     if nested > MOST_NESTED {
         return Json::Null;
     }
-    // What has its default value is not in the bytes of a message, and is there all the same.
+    // A field with its default value is not in the bytes of a message, and is there nevertheless.
     let is_there = |field: &FieldDescriptor| !field.supports_presence() || message.has_field(field);
     let fields = message.descriptor();
     let there = fields.fields().filter(is_there).map(|field| (field.name().to_owned(), json(&message.get_field(&field), nested)));

@@ -80,7 +80,7 @@ pub struct Health {
 
 /// Writes a bag on a thread of its own.
 ///
-/// Dropping it finishes the bag too, but then nobody hears what was lost; one that is to be whole is removed.
+/// Dropping it finishes the bag too, but then losses are not reported; one that is to be whole is removed.
 pub struct Recorder {
     name: String,
     queue: Option<SyncSender<Item>>,
@@ -90,7 +90,7 @@ pub struct Recorder {
     refused: Vec<u64>,
     /// Messages per topic that are known to have been sent.
     due: Vec<u64>,
-    /// Whether nobody knows what is missing behind the last message.
+    /// Whether it is unknown what is missing behind the last message.
     open_end: bool,
     when_full: WhenFull,
     /// Where the file is put once it is whole.
@@ -188,24 +188,23 @@ impl Recorder {
         }
     }
 
-    /// Says that every topic has been asked for its messages since the last checkpoint. An ordered bag is then
-    /// exactly in order; without checkpoints the order is settled every 50 ms, which a machine that stalls
-    /// for longer may defeat for events, gains and status.
+    /// Marks that every topic has been asked for its messages since the last checkpoint. An ordered bag is then exactly in order; without checkpoints
+    /// the order is settled every 50 ms, which a machine that stalls for longer may defeat for events, gains and status.
     pub fn checkpoint(&mut self) {
         if let Some(queue) = &self.queue {
-            // A full queue means that the thread is behind; the next checkpoint says the same.
+            // A full queue means that the thread is behind; the next checkpoint has the same effect.
             let _ = queue.try_send(Item::Checkpoint);
         }
     }
 
-    /// That at least so many messages of a topic were sent, as somebody else knows: those that do not come are counted as lost.
+    /// Sets that at least this number of messages of a topic were sent, from another source: those that do not come are counted as lost.
     pub(crate) fn expect(&mut self, topic: usize, messages: u64) {
         if let Some(due) = self.due.get_mut(topic) {
             *due = messages.max(*due);
         }
     }
 
-    /// That nobody knows what is missing behind the last message, as of a bag that was recovered.
+    /// Marks that it is unknown what is missing behind the last message, as for a bag that was recovered.
     pub(crate) fn leave_end_open(&mut self) {
         self.open_end = true;
     }
@@ -222,8 +221,8 @@ impl Recorder {
 
     /// Writes what is queued, the verdict and the summary.
     ///
-    /// Errors: the bag could not be written to its end; it then holds what had been written before, or is not there if it was to be
-    /// whole, and [`Recorder::health`], asked before, has the counts.
+    /// Errors: the bag could not be written to its end. It then holds what had been written before, or is not there if it was to be whole.
+    /// [`Recorder::health`], asked before, has the counts.
     pub fn finish(mut self) -> Result<Completeness, BagError> {
         self.close()
     }
@@ -237,7 +236,7 @@ impl Recorder {
         });
         let completeness = Completeness { topics: counted.collect(), late: 0, recovered: self.open_end };
         if let Some(queue) = self.queue.take() {
-            // Waits for room. A thread that has stopped says why below.
+            // Waits for room. A thread that has stopped gives the reason below.
             let _ = queue.send(Item::Finish(completeness));
         }
         match self.thread.take().map(JoinHandle::join) {
@@ -278,7 +277,7 @@ impl Scribe {
             Ok(completeness) => Some(completeness),
             Err(error) => {
                 let _ = self.shared.error.set(error.to_string());
-                // What is on the disk stays as it is: closing the bag would write to a disk that has just refused.
+                // What is on the disk stays unchanged: closing the bag would write to a disk that has just refused.
                 self.writer.abandon();
                 None
             }

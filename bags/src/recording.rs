@@ -7,9 +7,9 @@ use backdrive_plant::recording::{Columns, Piece, Recording, Source};
 
 /// Reads the signals of a model, as [`backdrive_plant::recording::read_csv`] does from a table.
 ///
-/// A signal is where its rule in `columns` says, else in `position[0]` of `/recording/NAME`, as [`crate::import_csv`]
-/// puts it; `names` of `None` takes every number in the bag. `hold` tells how a signal runs between its samples
-/// where they have no steps in common. Rows in which a signal is missing are left out and show as gaps of the recording.
+/// A signal is found by its rule in `columns`, else in `position[0]` of `/recording/NAME`, as [`crate::import_csv`] puts it; `names` of `None` takes
+/// every number in the bag. `hold` is the interpolation of a signal between its samples where they have no steps in common. Rows in which a signal is
+/// missing are left out and show as gaps of the recording.
 ///
 /// Errors: as of [`crate::signals()`]; a signal that was never measured; fewer than two rows; a `where` that is not for bags.
 pub fn recording(

@@ -48,12 +48,11 @@ pub struct RecoverReport {
     pub was_clean: bool,
     /// Records or chunks that are damaged, with their place.
     pub damaged: Vec<String>,
-    /// Messages in the copy that stand in a damaged chunk: they are where its index says and decode as their type says, but no
-    /// checksum vouches for their values.
+    /// Messages in the copy from a damaged chunk: they are at the place in its index and decode by their type, but no checksum confirms their values.
     pub unconfirmed: u64,
-    /// Messages that the file held when it was whole, where its statistics or the indices of its chunks tell.
+    /// Messages that the file held when it was whole, where its statistics or the indices of its chunks contain this.
     pub expected: Option<u64>,
-    /// Messages of damaged chunks that could not be saved, per topic, as far as the chunks' indices tell.
+    /// Messages of damaged chunks that could not be saved, per topic, where the chunks' indices contain them.
     pub missing: BTreeMap<String, u64>,
     /// The verdict in the copy, for bags of ours.
     pub completeness: Option<Completeness>,
@@ -63,9 +62,9 @@ pub struct RecoverReport {
 
 /// Copies everything that is whole into a clean bag, which has all of MCAP's indices: so this is the way to a bag in which a player can jump, too.
 ///
-/// Of a bag that was cut off the chunk that was open is lost, and of it the messages that had not reached the file. Of a damaged
-/// chunk those messages are saved that can still be read, stand where the chunk's index says, and hold what their type says.
-/// Errors: `from` cannot be read or is no MCAP file, `to` exists (unless it may be replaced), is being written, or cannot be.
+/// Of a bag that was cut off the chunk that was open is lost, and of it the messages that had not reached the file. Of a damaged chunk those messages
+/// are saved that can still be read, are at the place in the chunk's index, and have the content of their type. Errors: `from` cannot be read or is
+/// no MCAP file, `to` exists (unless it may be replaced), is being written, or cannot be.
 pub fn recover(from: &Path, to: &Path, overwrite: bool) -> Result<RecoverReport, BagError> {
     not_itself(from, to)?;
     let mut frames = Frames::open(from)?;
@@ -128,9 +127,9 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
             }
         }
     }
-    // Only a walk to the very end tells whether the file was closed.
+    // Only a walk to the very end shows whether the file was closed.
     while frames.next()?.is_some() {}
-    // Topics on which nothing was said are topics of the bag too.
+    // Topics without messages are topics of the bag too.
     for id in copy.found.channels.keys().copied().collect::<Vec<_>>() {
         copy.channel(id).map_err(failed)?;
     }
@@ -147,10 +146,10 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     report.expected = statistics.filter(|_| report.was_clean).map(counted).or((known > 0).then_some(report.messages + known));
     let out = begun.writer("", "").map_err(failed)?;
     if run {
-        // A verdict of the recorder knows more than the sequence numbers tell, if the bag got as far.
+        // A verdict of the recorder contains more than the sequence numbers, if the bag got as far.
         let original = Reader::open(from).ok();
         let told = original.as_ref().and_then(|reader| reader.completeness().cloned());
-        // Of a bag that another program wrote again without the record, the topics tell by each other what is missing at their ends.
+        // Of a bag that another program rewrote without the record, a comparison of the topics shows what is missing at their ends.
         let uncounted = original.filter(|_| told.is_none() && report.was_clean && report.damaged.is_empty());
         let faults = uncounted.and_then(|reader| Account::of(&reader).ok()).map(|account| account.faults).unwrap_or_default();
         let verdict = match told {
@@ -296,7 +295,7 @@ impl Copy<'_> {
         Ok(statistics)
     }
 
-    /// What a channel carries, as it was described.
+    /// The content of a channel, from its description.
     fn carries(&self, id: u16) -> Carries {
         let Some(channel) = self.found.channels.get(&id) else { return Carries::Foreign };
         if self.found.says_steps(channel) {
@@ -306,19 +305,19 @@ impl Copy<'_> {
         schema.and_then(|schema| ros::kind_of(&schema.0)).map_or(Carries::Foreign, Carries::Ours)
     }
 
-    /// The message of a topic of ours, with what was said of it.
+    /// The message of a topic of ours, with its facts.
     fn decode(&self, said: &Said, kind: Kind, header: &MessageHeader, data: &[u8]) -> Result<Message, ros::RosError> {
         let topic = self.found.channels.get(&header.channel_id).map_or("", |channel| &channel.topic);
         decode(kind, said.of(topic, header.sequence).as_ref(), data)
     }
 
-    /// Of what can be read in a damaged chunk: the messages of which the chunk's index knows, in the index' order, that hold what
-    /// their type says, and a sample only if the chunk says which step it is of. The others are counted as missing.
+    /// Of what can be read in a damaged chunk: the messages in the chunk's index, in its order, that have the content of their type. A sample counts
+    /// only if the chunk states which step it is of. The others are counted as missing.
     fn believable(&mut self, read: Vec<Record<'static>>, index: Index) -> Vec<Record<'static>> {
         let mut due: BTreeMap<u16, Due> =
             index.into_iter().map(|(channel, times)| (channel, Due { times: times.into(), ..Due::default() })).collect();
         let (mut kept, mut said) = (Vec::new(), Said::default());
-        // Of a topic's channel: the place in the index of the sample of which it was said last what it is, and its sequence number.
+        // Of a topic's channel: the place in the index of the last sample with facts, and its sequence number.
         let mut first: HashMap<u16, (u64, u64)> = HashMap::new();
         for record in read {
             let Record::Message { header, data } = &record else {
@@ -399,7 +398,7 @@ impl Copy<'_> {
                 self.begun.writer("", "")?.attach(&mcap::Attachment { log_time, create_time, name, media_type, data })?;
                 self.report.attachments += 1;
             }
-            // The copy has indices, which tell the times.
+            // The copy has indices, which contain the times.
             Record::Metadata(metadata) if metadata.name == COMPLETENESS || metadata.name == SPANS => {}
             Record::Metadata(metadata) => {
                 if metadata.name == RUN {

@@ -29,7 +29,7 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// A field as it is.
+    /// A field, unchanged.
     pub fn new(name: &str, topic: &str, field: &str) -> Signal {
         let (name, topic, field) = (name.to_owned(), topic.to_owned(), field.to_owned());
         Signal { name, topic, field, scale: 1.0, offset: 0.0, hold: Hold::Linear }
@@ -138,7 +138,7 @@ pub(crate) fn series_of(reader: &Reader, wanted: &[Signal], most: usize) -> Resu
             std::collections::hash_map::Entry::Occupied(plan) => plan.into_mut(),
             std::collections::hash_map::Entry::Vacant(vacant) => {
                 let schema = topic.parse_schema()?;
-                // Where the bag tells the axes, they are the same in every message.
+                // Where the bag states the axes, they are the same in every message.
                 let may_change = topic.axes.is_empty() && schema.name_list().is_some();
                 let stamp = schema.stamp();
                 vacant.insert(Plan { stamp, schema, fields: Vec::new(), joints: may_change.then(Vec::new) })
@@ -170,7 +170,7 @@ pub(crate) fn series_of(reader: &Reader, wanted: &[Signal], most: usize) -> Resu
             Some(path) => plan.schema.read_time_ns(path, &entry.payload).map_err(|what| wrong(path, what))?,
             None => None,
         };
-        // A stamp that nobody filled in is 0.
+        // A stamp that was not filled in is 0.
         let ns = stamp.filter(|stamp| *stamp != 0 || step.is_some()).unwrap_or(entry.log_time_ns as i64);
         // Seconds since 1970 would leave only 0.2 µs of a double; seconds since the first message are exact to the ns.
         let begin = *begin.get_or_insert(ns);
@@ -211,7 +211,7 @@ fn joints_change(before: &[String], now: &[String], path: &FieldPath) -> String 
 }
 
 fn by_step(series: &[Series], sparse: &[bool], trim: bool, rate_hz: f64, clock: Option<Series>) -> Signals {
-    // Topics that speak now and then have a value at every step: the last one they told.
+    // Topics that publish now and then have a value at every step: the last one.
     let all_sparse = sparse.iter().all(|sparse| *sparse);
     let dense = || series.iter().zip(sparse).filter(|(_, sparse)| all_sparse || !**sparse).map(|(series, _)| series);
     let mut steps: Vec<u64> = dense().flat_map(|series| series.steps.iter().copied()).collect();

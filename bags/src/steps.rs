@@ -1,9 +1,9 @@
 //! Which step each sample of a bag is of: what a `JointState` has no field for, on a topic beside the others.
 //!
-//! Nearly always a topic's next sample is one step and one sequence number later than the one before it, from the same source and
-//! with the same flags. So it is said once in every chunk for each topic that speaks in it, before its first sample there, and again
-//! where a sample is not what counting on gives. A chunk can be read without those before it, and the messages cost about a hundredth
-//! of the bag, where one beside each sample would double its index.
+//! Nearly always a topic's next sample is one step and one sequence number later than the one before it, from the same source and with the same
+//! flags. So its facts are written once in every chunk for each topic that has messages in it, before its first sample there. They are written again
+//! where a sample differs from counting on. A chunk can be read without those before it, and the messages cost about a hundredth of the bag, where
+//! one beside each sample would double its index.
 
 use crate::BagError;
 use backdrive_msgs::Sample;
@@ -11,7 +11,7 @@ use backdrive_msgs::ros::{self, Facts};
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 
-/// The topic on which it is said; its messages are [`ros::STEPS`].
+/// The topic of these facts; its messages are [`ros::STEPS`].
 pub(crate) const STEPS_TOPIC: &str = "/backdrive/steps";
 
 /// While writing: what a reader expects of a topic's next sample.
@@ -19,7 +19,7 @@ pub(crate) const STEPS_TOPIC: &str = "/backdrive/steps";
 pub(crate) struct Expected(Option<Facts>);
 
 impl Expected {
-    /// Takes notice of a topic's next sample; whether it has to be said what it is.
+    /// Takes a topic's next sample; returns whether its facts have to be written.
     pub(crate) fn must_say(&mut self, sample: &Sample) -> bool {
         let Sample { layout, source, step, sequence, flags, stamp_ns, .. } = *sample;
         let facts = Facts { layout, source, step, sequence, flags, stamp_ns: None };
@@ -37,7 +37,7 @@ impl Expected {
 /// As many of the last statements of a topic are remembered: another program may have written a sample behind the statement about the next one.
 const REMEMBERED: usize = 8;
 
-/// While reading: what was said last of each topic, the newest first.
+/// While reading: the last facts of each topic, the newest first.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Said(HashMap<String, VecDeque<Facts>>);
 
@@ -54,9 +54,9 @@ impl Said {
         Ok(())
     }
 
-    /// What is so of the sample of `topic` whose sequence number ends in these 32 bits; `None` where nothing was said of it.
+    /// The facts of the sample of `topic` whose sequence number ends in these 32 bits; `None` where there are none.
     pub(crate) fn of(&self, topic: &str, sequence: u32) -> Option<Facts> {
-        // Some may be missing in between; none comes before the one of which it was said.
+        // Some may be missing in between; none comes before the one with the facts.
         let ahead = |first: &Facts| sequence.wrapping_sub(first.sequence as u32);
         let first = self.0.get(topic)?.iter().find(|first| ahead(first) <= i32::MAX as u32)?;
         let ahead = ahead(first);
@@ -64,7 +64,7 @@ impl Said {
         Some(Facts { step, sequence, stamp_ns: first.stamp_ns.filter(|_| ahead == 0), ..*first })
     }
 
-    /// Nothing that was said holds any more: something may be missing.
+    /// Discards all facts: something may be missing.
     pub(crate) fn forget(&mut self) {
         self.0.clear();
     }
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use backdrive_msgs::{MAX_AXES, flag};
 
-    /// The samples as they are read back from what is written of them, in order, and how often something had to be said.
+    /// The samples as read back from what is written of them, in order, and how often facts had to be written.
     fn there_and_back(samples: &[Sample]) -> (Vec<Sample>, usize) {
         let (mut expected, mut said, mut payload, mut count) = (Expected::default(), Said::default(), Vec::new(), 0);
         let read = samples.iter().map(|sample| {

@@ -55,7 +55,7 @@ impl Whole {
                 Err(e) => return Err(failed(&path)(e.error)),
             }
         }
-        // Held until the file is in its place: nobody begins to write there meanwhile.
+        // Held until the file is in its place: no other writer begins there meanwhile.
         let _before = lock(&path, overwrite)?;
         made.persist(&place).map_err(|e| failed(&path)(e.error))?;
         sync_folder(&place);

@@ -1,10 +1,10 @@
-//! A bag without some of its topics: what nobody measured, or nobody is to see.
+//! A bag without some of its topics: those that were not measured, or are to be hidden.
 
 use crate::{BagError, BagHeader, Reader, Recorder, RecorderOptions, WhenFull};
 use std::path::Path;
 
-/// Copies a bag of ours to a new file but for the topics that `leave_out` names; `change` may take out of the header what tells the same.
-/// The copy has a verdict of its own about what it holds. The number of messages in it.
+/// Copies a bag of ours to a new file except for the topics that `leave_out` names; `change` may remove the same information from the header. The
+/// copy has a verdict of its own about what it holds. The number of messages in it.
 ///
 /// # Errors
 /// `from` cannot be read or is no bag of ours, `to` exists or cannot be written.

@@ -33,7 +33,7 @@ pub(crate) enum WriteError {
     Json(#[from] serde_json::Error),
 }
 
-/// `mcap` says that there was an I/O error; the person at the disk wants to know which.
+/// `mcap` reports only that there was an I/O error; the user needs to know which.
 pub(crate) fn reason(error: &mcap::McapError) -> String {
     match error {
         mcap::McapError::Io(source) => source.to_string(),
@@ -42,7 +42,7 @@ pub(crate) fn reason(error: &mcap::McapError) -> String {
 }
 
 /// The format options that all bags of ours share, of MCAP's indices all: lz4, because its worst stall is 0.3 ms where that of zstd is 60 ms. Chunks end where
-/// the caller says: no limit of size may part a sample from what is said of it.
+/// the caller decides: no limit of size may separate a sample from its facts.
 pub(crate) fn options() -> mcap::WriteOptions {
     mcap::WriteOptions::new()
         .profile("ros2")
@@ -117,8 +117,8 @@ impl BagWriter {
     /// Writes everything that comes before the first message, so that a bag that is cut off later has it.
     pub(crate) fn new(store: Box<dyn Store>, header: &BagHeader, chunk_bytes: u64, size: Arc<AtomicU64>) -> Result<BagWriter, WriteError> {
         let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size: size.clone() });
-        // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message,
-        // where without both it reads the file from its beginning, as the other readers do.
+        // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message. Without
+        // both it reads the file from its beginning, as the other readers do.
         let mut mcap = options().emit_message_indexes(false).emit_chunk_indexes(false).create(sink)?;
         let mut channels = Vec::with_capacity(header.topics.len());
         for info in &header.topics {
@@ -186,7 +186,7 @@ impl BagWriter {
         Ok(())
     }
 
-    /// Ends the chunk at hand, and says what it holds.
+    /// Ends the current chunk, and records its content.
     fn end_chunk(&mut self) -> Result<(), WriteError> {
         if self.in_chunk > 0 {
             self.mcap.write_private_record(COMPACT_INDEX, &index::encode(&self.index), Default::default())?;

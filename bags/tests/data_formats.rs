@@ -55,7 +55,7 @@ fn script(python: &Path) -> Command {
     command
 }
 
-/// The bits of a column as the script tells them.
+/// The bits of a column as the script prints them.
 fn bits(values: &[f64]) -> Vec<Value> {
     values.iter().map(|value| format!("{:016x}", value.to_bits()).into()).collect()
 }

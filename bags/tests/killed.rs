@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 const VICTIM: &str = "BACKDRIVE_TEST_VICTIM";
 
-/// What the other test starts and kills: it records at 2000 messages per second and says how far it is.
+/// The process that the other test starts and kills: it records at 2000 messages per second and prints its progress.
 #[test]
 #[ignore = "only of use as the process that is killed"]
 fn victim() {

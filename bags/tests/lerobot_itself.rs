@@ -6,8 +6,8 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 
-/// What lerobot finds in a dataset of two episodes, of 60 and 80 rows at 50 Hz: of each joint a position of 0.01 rad times the row, an effort of 0.5 N m in the first and 1.5 N m in the
-/// second, a target of twice the position the other way.
+/// What lerobot finds in a dataset of two episodes, of 60 and 80 rows at 50 Hz. Each joint has a position of 0.01 rad times the row, an effort of 0.5 N m in
+/// the first and 1.5 N m in the second, and a target of twice the position with the opposite sign.
 fn told(python: &OsStr, joints: &[&str]) -> Value {
     let folder = tempfile::tempdir().expect("a directory");
     let bags = [0, 1].map(|episode| {

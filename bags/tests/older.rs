@@ -1,4 +1,4 @@
-//! Bags in which a sample says in its frame id what a `JointState` has no field for are read as they were.
+//! Bags in which the frame id of a sample holds what a `JointState` has no field for are read unchanged.
 
 mod common;
 
@@ -69,7 +69,7 @@ fn an_older_bag_reads_as_it_did() {
     write(&path, 700);
     let sent = common::texts(&common::run(700));
     assert_eq!(common::texts(&common::read(&path)), sent);
-    // Aligned by step, which only the frame id tells.
+    // Aligned by step, which is only in the frame id.
     let wanted = [Signal::new("x", "/master/measured_js", "position[0]"), Signal::new("f", "/master/servo_jf", "effort[0]")];
     let table = signals(&Reader::open(&path).unwrap(), &wanted).unwrap();
     assert!(table.alignment.by_step && table.steps.as_ref().is_some_and(|steps| steps.iter().copied().eq(0..700)));

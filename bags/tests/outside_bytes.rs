@@ -1,4 +1,4 @@
-//! Tables that are damaged, or made to cost more than they look: an error that says what and where, at once.
+//! Tables that are damaged, or made to cost more than they seem to: an error with its cause and place, at once.
 
 use backdrive_bags::{BagError, ImportOptions, import_table};
 use flate2::Compression;

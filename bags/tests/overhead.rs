@@ -70,7 +70,7 @@ fn what_stands_at_the_end_says_the_same_as_all_messages() {
     assert!(!short.read_whole && whole.read_whole);
     assert_eq!(backdrive_bags::BagInfo { read_whole: true, ..short }, whole);
     assert!(Reader::open(&path).expect("it opens").damage().is_empty());
-    // Where the end is missing all is read, and that is told.
+    // Where the end is missing all is read, and that is reported.
     let bytes = std::fs::read(&path).expect("it reads");
     std::fs::write(&path, &bytes[..bytes.len() - 20]).expect("it writes");
     let cut = info(&path).expect("it is summed up");

@@ -116,7 +116,7 @@ fn gaps_are_counted_per_topic_and_stored() {
     assert_eq!(Reader::open(&path).expect("it opens").completeness(), Some(&completeness));
 }
 
-/// A disk with room for so many bytes, slow if so wished.
+/// A disk with room for this number of bytes, slow on request.
 struct Disk {
     bytes: io::Cursor<Vec<u8>>,
     room: u64,

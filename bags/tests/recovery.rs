@@ -1,4 +1,4 @@
-//! A bag that was cut off anywhere gives back everything that is whole.
+//! Everything that is whole in a bag that was cut off anywhere can be recovered.
 
 mod common;
 

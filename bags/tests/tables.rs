@@ -280,7 +280,7 @@ fn a_heading_that_is_asked_for_whole_names_its_unit_all_the_same() {
         let found = signals(&Reader::open(&bag).expect("it opens"), &[Signal::new("x", "/m", "position[0]")]).expect("it is there");
         assert_eq!((found.t[2], found.columns[0][2]), (4.0 * 1e-3, last), "{time} {column} {scale}");
     }
-    // A unit may be said where the heading has none.
+    // A unit may be given where the heading has none.
     write(&table, "t,x\n0,1\n1000000,2\n2000000,3\n");
     import_csv(&table, &bag, &ImportOptions { time: "t [ns]".to_owned(), overwrite: true, ..ImportOptions::default() })
         .expect("it imports");

@@ -1,7 +1,7 @@
 //! A master whose hand changes its grip while it holds.
 //!
-//! The law: a hand that tightens or loosens does so where it is. At the change the handle stays, its velocity and the force of the hand's spring stay, and
-//! from then on the force follows with the new stiffness, `dF = k' d(x_hand - x)`: the point that the spring pulls to is taken along, by
+//! The law: a hand that tightens or loosens does so where it is. At the change the handle's position and velocity and the force of the hand's spring do
+//! not change. From then on the force follows with the new stiffness, `dF = k' d(x_hand - x)`: the point that the spring pulls to moves along, by
 //! `(k/k' - 1) (x_hand - x)`. So no force jumps; the spring's energy `F^2 / 2k` becomes `F^2 / 2k'`, and the difference is what the muscle gives or takes
 //! ([`ChangingGrip::muscle_work`]).
 

@@ -67,9 +67,8 @@ impl Events {
 
 /// A core: stepped once per tick, in order of step.
 pub trait Core: Send {
-    /// Does one step. `inputs` and `outputs` are in the order in which the node kind lists its ports;
-    /// each output comes in as [`Sample::new`] of its axes and is sent as it is left (the runner fills
-    /// step, sequence, stamp and source).
+    /// Does one step. `inputs` and `outputs` are in the order in which the node kind lists its ports. Each output arrives as [`Sample::new`] of its
+    /// axes and is sent as `step` leaves it (the runner fills step, sequence, stamp and source).
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events);
 
     /// New gains are wanted from now on. Most cores have none.
@@ -80,7 +79,7 @@ pub trait Core: Send {
         None
     }
 
-    /// How far the loop is from its edge, if the core can tell.
+    /// The loop's stability margin, if the core can estimate it.
     fn margin(&self) -> Option<Told> {
         None
     }

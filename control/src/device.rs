@@ -34,7 +34,7 @@ pub enum DeviceError {
     /// What a node's controller knows or needs is not there.
     #[error(transparent)]
     Controller(#[from] crate::controller::ControllerError),
-    /// A force input is needed and a motion input is there, or the other way round.
+    /// A force input is needed and a motion input is there, or vice versa.
     #[error("model \"{model}\", axis \"{axis}\": as a {role} its feedback must be a {needed} input")]
     WrongFeedback {
         /// The model.
@@ -152,7 +152,7 @@ impl Device {
                 return Err(DeviceError::UndrivenInput { model: name, input: input.name.clone() });
             }
         }
-        // A negative delay says by how much the recordings had a motion too late; in a loop a motion is known when it happens.
+        // A negative delay is the time by which the recordings had a motion too late; in a loop a motion is known when it happens.
         for input in model.inputs.iter_mut().filter(|i| i.kind == InputKind::Motion) {
             input.delay = input.delay.max(0.0);
         }
@@ -273,7 +273,7 @@ impl Device {
         self.model.elements.get(element).map_or(f64::NAN, |element| at(element.between[0]) - at(element.between[1]))
     }
 
-    /// Energy of the springs of the attached grip as it was at the start, J, on an axis whose hand is `stretch` (m or rad) from the user's body.
+    /// Energy of the springs of the attached grip in its initial state, J, on an axis whose hand is `stretch` (m or rad) from the user's body.
     pub(crate) fn spring_energy(&self, axis: usize, stretch: f64) -> f64 {
         let stiffness = |element: usize| match self.model.elements[element].law.role() {
             Role::Linear(linear) => linear.stiffness,
@@ -282,7 +282,7 @@ impl Device {
         0.5 * stretch * stretch * self.axes[axis].port_forces.iter().map(|(element, _)| stiffness(*element)).sum::<f64>()
     }
 
-    /// Puts the hand of an axis elsewhere, without a motion from where it was.
+    /// Puts the hand of an axis at another position, without a motion between the two.
     pub(crate) fn move_hand(&mut self, axis: usize, position: f64) {
         if let Some(input) = self.axes[axis].hand {
             self.previous[input] = position;

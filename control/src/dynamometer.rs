@@ -79,7 +79,7 @@ impl Dynamometer {
         (self.state[0], held != asked)
     }
 
-    /// The torque as it is, N m.
+    /// The torque without noise, N m.
     pub fn torque(&self) -> f64 {
         self.state[0]
     }

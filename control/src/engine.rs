@@ -142,7 +142,7 @@ impl Engine {
         self.torque
     }
 
-    /// The torque as it is, N m.
+    /// The torque without noise, N m.
     pub fn torque(&self) -> f64 {
         self.torque
     }

@@ -5,8 +5,8 @@ use backdrive_msgs::Sample;
 
 /// Follows one input port: whether a new sample came, and for how many steps none has.
 ///
-/// A sample whose first axis is not measured, or is no finite number, counts as none: that is how a node says that it has
-/// nothing to say because its own input is missing, so that staleness travels along the loop.
+/// A sample whose first axis is not measured, or is no finite number, counts as none. A node sends such a sample when its own input is missing, so
+/// staleness propagates along the loop.
 #[derive(Debug, Clone, Default)]
 pub struct Freshness {
     newest_step: Option<u64>,

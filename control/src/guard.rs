@@ -1,22 +1,21 @@
-//! The guard: backs the force gain off when the loop is, or is about to be, beyond its edge.
+//! The guard: reduces the force gain when the loop is, or is about to be, above its stability limit.
 //!
-//! It watches the reflected force and the master's motion; what they do must be the loop's doing and not the hand's. The
-//! measure of that is the net energy which the force channel puts into the master's port, `W = sum F_f(k) (x_m(k+1) -
-//! x_m(k))`: a hand that pushes against a passive wall takes energy out of that port, so `W > 0` is needed for a trip.
+//! It watches the reflected force and the master's motion; what they do must be the loop's doing and not the hand's. The measure is the net energy
+//! that the force channel puts into the master's port, `W = sum F_f(k) (x_m(k+1) - x_m(k))`. A hand that pushes against a passive wall extracts
+//! energy from that port, so a trip requires `W > 0`.
 //!
 //! - **Growing**: in windows of 50 ms the part of the force above 8 Hz grows by half over four windows, with `W > 0`.
 //! - **Persistent**: that part stays large, with `W > 0`, over six windows.
-//! - **Runaway**, a canceller that takes out too much at rest: over five windows the force grows by increments of which each
-//!   is more than 1.15 times the one before, at a ratio that does not fall, while the master gives way along the force
-//!   (`W > 0`). That is an exponential. A passive wall without a canceller pushes harder only while the hand goes into it,
-//!   against the force; on release the master goes along the force while the force falls; behind a good canceller a
-//!   hand that pushes (as `t`, `t^2`, `t^3`) has ratios that fall; and below its edge an over-cancelling loop creeps, but
-//!   slower and slower. Windows of 5 to 160 ms are watched at once, so that fast and slow ones are seen after about as many
-//!   e-foldings. A thing that itself pushes the slave ever harder is taken for a run-away.
-//! - **Thin margin**, where there is a dither: [`crate::live_margin`] sees the edge nearer than 1.25 times the gain, also at
-//!   the upper end of its standard deviation.
+//! - **Runaway**, a canceller that subtracts too much at rest. Over five windows the force grows by increments of which each is more than 1.15 times
+//!   the one before, at a ratio that does not fall. The master yields along the force (`W > 0`). That is an exponential. A passive wall without a
+//!   canceller pushes harder only while the hand moves into it, against the force; on release the master moves along the force while the force falls.
+//!   Behind a good canceller a hand that pushes (as `t`, `t^2`, `t^3`) has ratios that fall. Below its stability limit an over-cancelling loop
+//!   creeps, but slower and slower. Windows of 5 to 160 ms are watched at once, so that fast and slow ones are seen after about as many e-foldings. A
+//!   thing that itself pushes the slave ever harder is taken for a run-away.
+//! - **Thin margin**, where there is a dither: the critical gain of [`crate::live_margin`] is below 1.25 times the gain, also at the upper end of its
+//!   standard deviation.
 //!
-//! What was taken back stays back until new gains are asked for: it does not creep up again to find the edge anew.
+//! A reduced gain stays reduced until new gains are requested: it does not creep up again to find the limit a second time.
 
 use crate::live_margin::CORNER_HZ;
 use backdrive_msgs::{MAX_AXES, Sample};
@@ -24,7 +23,7 @@ use backdrive_msgs::{MAX_AXES, Sample};
 const WINDOW_S: f64 = 0.05;
 /// Growth of the oscillating part over three windows that counts as growing.
 const GROWTH: f64 = 1.5;
-/// Growth over three windows beyond which more is taken back at once.
+/// Growth over three windows beyond which the gain is reduced by more at once.
 const FAST_GROWTH: f64 = 3.0;
 /// Windows in which a large oscillation must persist.
 const PERSISTENT: u32 = 6;
@@ -34,16 +33,16 @@ const STILL_PERSISTENT: u32 = 4;
 const CROSSINGS: u32 = 3;
 /// Time after a back-off within which the next one takes more, s.
 const AGAIN_S: f64 = 1.0;
-/// What is left of the gain after a back-off.
+/// Remaining share of the gain after a back-off.
 const BACK_OFF: f64 = 0.8;
 /// The same where it grows fast, runs away, or has next to no margin.
 const FAST_BACK_OFF: f64 = 0.6;
 /// The same where the last back-off did not end it.
 const AGAIN_BACK_OFF: f64 = 0.5;
-/// A hand's time constant, damping over stiffness, s, rather long: an over-cancelling loop at `c` times its edge runs away at
-/// about `(c - 1)` over it, so that a rate tells how far beyond the edge it is.
+/// A hand's time constant, damping over stiffness, s, rather long. An over-cancelling loop at `c` times its critical gain runs away at about
+/// `(c - 1)` over it, so the rate gives the distance above the limit.
 const HAND_S: f64 = 0.1;
-/// What is left of the edge that the rate of a run-away tells.
+/// Share of the critical gain, as estimated from the rate of a run-away, that remains.
 const OF_EDGE: f64 = 0.7;
 /// Least that is left after one back-off.
 const LEAST_LEFT: f64 = 0.1;
@@ -71,7 +70,7 @@ pub enum Reason {
     Persistent,
     /// Force and master ran away together, ever faster.
     Runaway,
-    /// The edge that the dither shows is near.
+    /// The stability limit that the dither shows is near.
     ThinMargin,
 }
 
@@ -243,7 +242,7 @@ impl Guard {
         is_thin.then_some(Reason::ThinMargin)
     }
 
-    /// One step, with the force now reflected and the master's newest measurement. Says when it backs off.
+    /// One step, with the force now reflected and the master's newest measurement. Returns the event when it backs off.
     pub fn step(&mut self, force: &[f64; MAX_AXES], master: Option<&Sample>) -> Option<Reason> {
         // The share follows its target within a window, so that a back-off is no jolt.
         self.share += (self.target - self.share) * (4.0 / self.window as f64).min(1.0);
@@ -279,7 +278,7 @@ impl Guard {
         let runaway = self.drift();
         let oscillation = self.oscillation();
         let (reason, left) = runaway.or(oscillation)?;
-        // What one back-off did not end is further beyond the edge than that.
+        // If one back-off did not end it, the loop is further above the limit than that.
         let left = if self.is_again() { left.min(AGAIN_BACK_OFF) } else { left };
         self.since_last = 0;
         self.target *= left;
@@ -411,7 +410,7 @@ mod tests {
                 assert!(slide(push, 1e-3, duration + 0.5).is_empty(), "t^{power} over {duration} s");
             }
         }
-        // Below its edge the loop creeps to where it rests.
+        // Below its stability limit the loop creeps to where it rests.
         for rate in [0.5, 5.0, 50.0] {
             assert!(slide(|t| 4.0 * (1.0 - (-rate * t).exp()), 1e-3, 4.0).is_empty(), "{rate}");
             // And a release.

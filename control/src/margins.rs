@@ -1,9 +1,9 @@
-//! How far a loop is from its edge: margins of a frequency response, pure and without allocation.
+//! The stability margins of a loop, from a frequency response, pure and without allocation.
 //!
-//! `L` is the transfer once round the loop, of a closed loop `F_f = d + L F_f`: the critical point is `+1`, on the positive
-//! real axis, at any frequency and also at DC, where a loop of positive feedback runs away without oscillating.
-//! All functions take lines of rising frequency, Hz; lines that are not finite are passed over. Between lines, `L` is
-//! interpolated in the logarithm of its magnitude and in its phase, which is exact for a pure delay.
+//! `L` is the transfer once round the loop, of a closed loop `F_f = d + L F_f`. The critical point is `+1`, on the positive real axis, at any
+//! frequency and also at DC, where a loop of positive feedback runs away without oscillating. All functions take lines of rising frequency, Hz; lines
+//! that are not finite are passed over. Between lines, `L` is interpolated in the logarithm of its magnitude and in its phase, which is exact for a
+//! pure delay.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 /// Where `k L` passes through `+1`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Crossing {
-    /// The factor `k` by which the gain may be multiplied until the loop is on its edge, above 0.
+    /// The factor `k` by which the gain may be multiplied until the loop is at its stability limit, above 0.
     pub factor: f64,
     /// Hz; 0 for a loop that runs away without oscillating.
     pub frequency_hz: f64,
@@ -21,15 +21,15 @@ pub struct Crossing {
 /// The margins of a loop at the gain at which `L` is given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Margins {
-    /// By how much the gain may rise, dB; negative where the loop is beyond its edge; `None` where no gain reaches it.
+    /// By how much the gain may rise, dB; negative where the loop is above its stability limit; `None` where no gain reaches it.
     pub gain_db: Option<f64>,
-    /// Smallest angle of `L` from `+1` where `|L| = 1`, degrees; negative beyond the edge; `None` where `|L|` never is 1.
+    /// Smallest angle of `L` from `+1` where `|L| = 1`, degrees; negative above the stability limit; `None` where `|L|` never is 1.
     pub phase_deg: Option<f64>,
-    /// Smallest extra loop delay that makes it unstable, ms; 0 beyond the edge; `None` where no delay does.
+    /// Smallest extra loop delay that makes it unstable, ms; 0 above the stability limit; `None` where no delay does.
     pub delay_ms: Option<f64>,
     /// Smallest `|1 - L|`: 1 over the peak of the sensitivity.
     pub modulus: f64,
-    /// The edge: the smallest factor on the gain at which the loop is no longer stable.
+    /// The stability limit: the smallest factor on the gain at which the loop is no longer stable.
     pub critical: Option<Crossing>,
 }
 
@@ -52,8 +52,8 @@ fn spans<'a>(hz: &'a [f64], l: &'a [Complex<f64>]) -> impl Iterator<Item = ((f64
 
 /// `L(0)`, which is real, continued from the two lowest lines; `None` without lines.
 ///
-/// A lowest line far from the real axis continues an integrator, `L = -K/s` above it and `L = K/s` below: then of the sign that
-/// the way round the pole has, and of the size of the lowest line.
+/// A lowest line far from the real axis continues an integrator, `L = -K/s` above it and `L = K/s` below. The value at DC then has the sign of the
+/// path round the pole, and the size of the lowest line.
 fn at_dc(hz: &[f64], l: &[Complex<f64>]) -> Option<f64> {
     let mut lowest = lines(hz, l);
     let (f0, l0) = lowest.next()?;
@@ -72,12 +72,12 @@ fn continued((f0, l0): (f64, Complex<f64>), next: Option<(f64, Complex<f64>)>) -
     let lowest = inverse(l0);
     let Some((f1, l1)) = next.filter(|(f1, l1)| f0 > 0.0 && *f1 > f0 && l1.norm_sqr() > 0.0) else { return 1.0 / lowest };
     let change = (lowest - inverse(l1)) * f0 * f0 / (f1 * f1 - f0 * f0);
-    // No more than half of the value itself: two lines far from DC do not tell more.
+    // No more than half of the value itself: two lines far from DC do not determine more.
     1.0 / (lowest + change.clamp(-0.5 * lowest.abs(), 0.5 * lowest.abs()))
 }
 
-/// The crossing at DC that the lowest line, (Hz, L), and the one above it tell of: where `L(0)` is positive the loop runs away
-/// without oscillating at `1 / L(0)`.
+/// The crossing at DC that the lowest line, (Hz, L), and the one above it imply: where `L(0)` is positive the loop runs away without oscillating at
+/// `1 / L(0)`.
 pub fn at_the_bottom(lowest: (f64, Complex<f64>), next: Option<(f64, Complex<f64>)>) -> Option<Crossing> {
     let (f0, l0) = lowest;
     if !(l0.re > 0.0 && l0.arg().abs() < NEAR_DC) {
@@ -110,17 +110,17 @@ fn crossings<'a>(hz: &'a [f64], l: &'a [Complex<f64>]) -> impl Iterator<Item = C
     dc.into_iter().chain(spans(hz, l).filter_map(|(a, b)| between(a, b)))
 }
 
-/// The smallest `k > 0` at which `k L` passes through `+1`: for a loop that is stable open, the edge of stability.
+/// The smallest `k > 0` at which `k L` passes through `+1`: for a loop that is stable open, the stability limit.
 ///
-/// `hz` rises; `l` is `L` at each. `None` where no gain reaches the edge within the lines.
+/// `hz` rises; `l` is `L` at each. `None` where no gain reaches the stability limit within the lines.
 pub fn critical_factor(hz: &[f64], l: &[Complex<f64>]) -> Option<Crossing> {
     crossings(hz, l).min_by(|a, b| a.factor.total_cmp(&b.factor))
 }
 
 /// Whether the closed loop is stable, by Nyquist's criterion: `1 - L` does not wind about 0 between DC and the last line.
 ///
-/// `L` must be stable open, the lowest line below everything that moves in it, and the lines so close that it turns by less than half a circle about `+1` from one to the next.
-/// A loop that is stable only between two gains is judged as it is. Without lines it is stable: nothing is fed back.
+/// `L` must be stable open, and the lowest line below all its dynamics. The lines must be so close that it turns by less than half a circle about `+1` from
+/// one to the next. A loop that is stable only between two gains is judged at its own gain. Without lines it is stable: nothing is fed back.
 pub fn is_stable(hz: &[f64], l: &[Complex<f64>]) -> bool {
     let one = Complex::new(1.0, 0.0);
     let (Some(dc), Some((_, last))) = (at_dc(hz, l), lines(hz, l).last()) else { return true };
@@ -194,7 +194,7 @@ mod tests {
         hz.iter().map(|f| l(Complex::new(0.0, TAU * f))).collect()
     }
 
-    /// `L = -K e^{-s T} / s`: on the edge at `w = pi / (2 T)`, for `K = pi / (2 T)`.
+    /// `L = -K e^{-s T} / s`: at the stability limit at `w = pi / (2 T)`, for `K = pi / (2 T)`.
     #[test]
     fn an_integrator_with_delay_has_its_closed_form() {
         let (delay, gain) = (0.004, 100.0);
@@ -220,7 +220,7 @@ mod tests {
         }
     }
 
-    /// A hand on a spring against a wall, `L = -k G(s) e^{-s T}`: the edge solves `arg G - w T = -pi`.
+    /// A hand on a spring against a wall, `L = -k G(s) e^{-s T}`: the stability limit solves `arg G - w T = -pi`.
     #[test]
     fn a_second_order_loop_with_delay_has_its_closed_form() {
         let (mass, damping, stiffness, delay, wall) = (0.03, 3.0, 4000.0, 0.002, 500.0);
@@ -251,7 +251,7 @@ mod tests {
         let at = |k: f64| is_stable(&hz, &l.iter().map(|l| l * k).collect::<Vec<_>>());
         assert!(at(3.9) && !at(4.1));
         assert!((margins(&hz, &l).modulus - 0.75).abs() < 0.01);
-        // A single lag of 2.5 Hz, of which two lines below the corner tell all.
+        // A single lag of 2.5 Hz, which two lines below the corner determine.
         let l = response(&hz, |s| 0.25 / (Complex::new(1.0, 0.0) + s / (TAU * 2.5)));
         assert!((critical_factor(&hz, &l).unwrap().factor - 4.0).abs() < 1e-9);
     }

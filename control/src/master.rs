@@ -29,7 +29,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// A master that lets go of the force `stale_after_s` after its last sample.
+    /// A master that removes the force `stale_after_s` after its last sample.
     pub fn new(device: Box<dyn Mechanism>, stale_after_s: f64, period_s: f64) -> Master {
         Master {
             device,
@@ -62,7 +62,7 @@ impl Core for Master {
         let axes = self.device.axes();
         if let Some(intent) = self.intent.new_sample(&inputs[0], |s| s.position[0]) {
             for axis in 0..axes {
-                // Where the intent says nothing, the hand stays.
+                // Where the intent has no value, the hand stays.
                 if intent.position[axis].is_finite() {
                     self.hand[axis] = intent.position[axis];
                 }
@@ -82,7 +82,7 @@ impl Core for Master {
                 self.last_force[axis] = if force.effort[axis].is_finite() { force.effort[axis] } else { 0.0 };
             }
         }
-        // A sender that bridged a gap in vain has no force to send, and says so.
+        // A sender that bridged a gap in vain has no force to send, and marks this.
         if inputs[1].sample.as_ref().is_some_and(|s| s.flags & flag::STALE != 0 && !s.effort[0].is_finite()) {
             self.outdated = true;
         }

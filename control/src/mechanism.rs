@@ -15,11 +15,11 @@ pub trait Mechanism: Send {
     fn step(&mut self, force: &[f64], hand: &[f64]);
     /// Measured position at the tip.
     fn measured(&self, axis: usize) -> f64;
-    /// Position of the user's body; NaN where nobody knows it.
+    /// Position of the user's body; NaN where it is not known.
     fn user_position(&self, axis: usize) -> f64;
-    /// Velocity of the user's body; NaN where nobody knows it.
+    /// Velocity of the user's body; NaN where it is not known.
     fn user_velocity(&self, axis: usize) -> f64;
-    /// Force of the hand on the user's body, positive along +x; NaN where nobody knows it.
+    /// Force of the hand on the user's body, positive along +x; NaN where it is not known.
     fn port_force(&self, axis: usize) -> f64;
     /// Whether it can go on: its state is finite, and it answers.
     fn is_finite(&self) -> bool;

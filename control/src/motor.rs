@@ -19,7 +19,7 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// One that begins to let go of the force `stale_after_s` after its last sample.
+    /// One that begins to remove the force `stale_after_s` after its last sample.
     pub fn new(stale_after_s: f64, period_s: f64) -> Motor {
         Motor {
             authority: Authority::new(stale_after_s, period_s),

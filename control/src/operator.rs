@@ -1,4 +1,4 @@
-//! The operator as a node: what the hand wants, as a script or as it was recorded.
+//! The operator as a node: the intended motion of the hand, from a script or a recording.
 
 use crate::core::{Core, Events, Port, Tick};
 use backdrive_msgs::{MAX_AXES, Sample};

@@ -54,7 +54,7 @@ struct Loop {
 }
 
 impl Rig {
-    /// A ram with its specimen attached, the demand per axis (one value per step, m or rad; it stays at its last value), and a seed for the load
+    /// A ram with its specimen attached, and the demand per axis (one value per step, m or rad; it stays at its last value). The seed is for the load
     /// cell's noise, without which it has none.
     pub fn new(device: Device, settings: RigSettings, mut demand: Vec<Vec<f64>>, noise_seed: Option<u64>, period_s: f64) -> Rig {
         demand.truncate(MAX_AXES);

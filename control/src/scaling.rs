@@ -35,7 +35,7 @@ impl Ramp {
 /// A contact force below this RMS is none, N or N m.
 const LEAST_FORCE: f64 = 0.01;
 
-/// A ring-down below this RMS is not looked at, N or N m.
+/// A ring-down below this RMS is not evaluated, N or N m.
 const LEAST_RING: f64 = 0.004;
 
 /// A change of gains that the graph file asks for.
@@ -132,14 +132,14 @@ impl Core for Forward {
         self.gains.set(gains);
     }
 
-    // The backward path tells the gains of both, for the guard acts there.
+    // The backward path reports the gains of both, because the guard acts there.
 }
 
 /// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs
 /// `force` (effort F_f = lambda F_s + dither), `dither` (effort: the added excitation alone).
 ///
-/// When contact forces stop coming the output is not measured: the master then lets go. It does so too where the contact
-/// force is that of a slave that holds because no command reaches it.
+/// When contact forces stop coming the output is not measured: the master then removes its force. It does so too where the contact force is that of a
+/// slave that holds because no command reaches it.
 pub struct Backward {
     gains: GainsInForce,
     contact: Freshness,

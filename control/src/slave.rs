@@ -6,12 +6,12 @@ use crate::freshness::{Freshness, bridged_steps};
 use crate::motor::Motor;
 use backdrive_msgs::{MAX_AXES, Sample, flag};
 
-/// Inputs `command` (position) or `force` (effort on the motor), as the model's feedback is a motion or a force; output `measured`
-/// (position and velocity of the tip, effort = force of the environment on the tip, negative when it pushes against +x).
+/// Inputs: `command` (position) or `force` (effort on the motor), for a model whose feedback is a motion or a force. Output: `measured` (position and
+/// velocity of the tip, effort = force of the environment on the tip, negative when it pushes against +x).
 ///
-/// Without a new command it holds the last one. The command is cut to the device's travel and speed. A force is that of the motor: at step k
-/// the plant is first carried from k-1 to k under the force of step k-1, then measured, so that topics are a recording as model files
-/// mean it; without a new force the last one is taken away as [`crate::master::Master`] does.
+/// Without a new command it holds the last one. The command is cut to the device's travel and speed. A force is that of the motor: at step k the
+/// plant is first carried from k-1 to k under the force of step k-1, then measured. Topics are therefore a recording as model files define it.
+/// Without a new force the last one is removed as in [`crate::master::Master`].
 pub struct Slave {
     device: Device,
     command: Freshness,
@@ -25,7 +25,7 @@ pub struct Slave {
 }
 
 impl Slave {
-    /// A slave that says that it holds when no command has come for `stale_after_s`.
+    /// A slave that reports that it holds when no command has come for `stale_after_s`.
     pub fn new(device: Device, stale_after_s: f64, period_s: f64) -> Slave {
         Slave {
             motor: device.is_driven_by_force().then(|| Motor::new(stale_after_s, period_s)),

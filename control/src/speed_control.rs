@@ -38,7 +38,7 @@ impl SpeedControl {
 
 /// Inputs `setpoint` (velocity), `measured` (velocity), `added` (effort); output `command` (effort: what the dynamometer shall give).
 ///
-/// Without a setpoint or a measurement it holds what it last heard; before the first of both it asks for nothing.
+/// Without a setpoint or a measurement it holds the last one received; before the first of both it requests nothing.
 pub struct SpeedControlNode {
     control: SpeedControl,
     fresh: [Freshness; 3],

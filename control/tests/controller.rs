@@ -56,7 +56,7 @@ fn states(model: &Model) -> Vec<(Reference, State, Bristles)> {
         .collect()
 }
 
-/// q'' of eqs (17) and (18) under a force, with these true numbers.
+/// q'' of eqs (17) and (18) under a force, with these true parameters.
 fn acceleration(u: f64, v: f64, b: &Bristles, truth: &backstepping::Estimates) -> f64 {
     let h = b.force / b.stiffness;
     (u - truth.stiffness * h - truth.viscous * v + truth.damping * b.leak * b.force) / 0.005

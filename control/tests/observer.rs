@@ -110,7 +110,7 @@ fn designs_that_cannot_be_are_refused() {
     let weights = Weights::default();
     assert_eq!(design(&bench(), &weights, 1.0), Err(DesignError::BackOff(1.0)));
     assert!(matches!(design(&System::shaft(0.9, 0.7, 2e4, 12.0, [0.0, 0.1]), &weights, 2.0), Err(DesignError::Number { .. })));
-    // Without a shaft between them the dynamometer's speed says nothing of the engine.
+    // Without a shaft between them the dynamometer's speed contains no information on the engine.
     let mut cut = System::shaft(0.9, 0.7, 0.0, 0.0, [0.1, 0.1]);
     cut.c = cut.c.rows(1, 1).into_owned();
     cut.noise.pop();

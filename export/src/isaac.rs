@@ -3,7 +3,7 @@
 //! `isaaclab.actuators.ActuatorBaseCfg` (<https://isaac-sim.github.io/IsaacLab/v2.3.2/source/api/lab/isaaclab.actuators.html>) gives, by joint and in rad:
 //! - `armature`, added to the inertia in joint space, kg m² or kg;
 //! - `friction` and `dynamic_friction`, dry friction at rest and in motion. From Isaac Sim 5.0 on they are efforts, N m or N (PhysX 5.6
-//!   `PxJointFrictionParams`); in 4.5 they were shares of the force that the joint passes on, so these numbers are wrong there;
+//!   `PxJointFrictionParams`); in 4.5 they were shares of the force that the joint transmits, so these values are wrong there;
 //! - `viscous_friction`, N m s/rad or N s/m. In USD itself (`physxJointAxis:angular:viscousFrictionCoefficient`) it is per degree: Isaac Lab converts;
 //! - `effort_limit_sim` and `velocity_limit_sim`, of the solver.
 //!
@@ -14,7 +14,7 @@ use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::Joint;
 
-/// A joint's name, what the file says of the joint, and what it is now.
+/// A joint's name, its description in the file, and its present terms.
 type Row<'a> = (&'a str, &'a Joint, JointTerms);
 
 /// The joints of a model's robot as a Python file with one `ImplicitActuatorCfg`.

@@ -16,7 +16,7 @@ pub(crate) struct Knows {
     pub rest: bool,
 }
 
-/// A joint in the few numbers that most programs have for it, N m, rad and s, or N, m and s.
+/// A joint in the few parameters that most programs have for it, N m, rad and s, or N, m and s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct JointTerms {
     /// kg m² or kg.

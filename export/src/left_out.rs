@@ -96,7 +96,7 @@ impl Change {
     }
 }
 
-/// A robot that cannot be computed with the change stays as it was.
+/// A robot that cannot be computed with the change stays unchanged.
 fn of_the_robot(model: &mut Model, change: impl FnOnce(&mut Robot)) {
     let Some(arm) = model.arm.as_mut() else { return };
     let mut robot = arm.robot.clone();
@@ -134,7 +134,7 @@ fn join(model: &mut Model, body: usize, into: usize) {
     }
 }
 
-/// The model as it was exported: with all changes.
+/// The exported model: with all changes.
 pub fn change_all(model: &Model, left_out: &[LeftOut]) -> Model {
     let mut changed = model.clone();
     left_out.iter().flat_map(|left| &left.changes).for_each(|change| change.apply(&mut changed));

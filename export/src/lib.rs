@@ -5,8 +5,8 @@
 //! - [`urdf`]: `<dynamics>` and `<limit>` of a robot's joints.
 //! - [`isaac`]: joint parameters for Isaac Lab.
 //!
-//! A target that has no word for an element gets what is nearest, or nothing; a [`LeftOut`] says so, and how the model is changed by it, so that the error
-//! that this makes can be simulated.
+//! A target that has no word for an element gets what is nearest, or nothing. A [`LeftOut`] records this and how it changes the model, so that the
+//! resulting error can be simulated.
 
 pub mod feedforward;
 pub mod isaac;

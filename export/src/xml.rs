@@ -1,4 +1,4 @@
-//! Text of XML: attributes, and changes to a file that leave the rest of it as it was.
+//! Text of XML: attributes, and changes to a file that leave the rest of it unchanged.
 
 use roxmltree::Node;
 use std::ops::Range;

@@ -207,7 +207,7 @@ fn what_a_sensor_or_a_motion_cannot_be_is_told() {
         ("acc", "acceleration", 0),
     ];
     assert_eq!(told, wanted);
-    // What is led is so heavy that nothing else moves it.
+    // A body on prescribed motion is so heavy that nothing else moves it.
     assert!(found.text.contains("mass=\"2000000\""), "{}", found.text);
 }
 

@@ -17,7 +17,7 @@ const SECONDS: f64 = 10.0;
 /// Substeps of our own solution, at which it has converged.
 const SUBSTEPS: usize = 20;
 
-/// Tones with an amplitude, that of each input begun elsewhere.
+/// Tones with an amplitude, those of each input with another phase.
 fn tones(input: usize, amplitude: f64) -> Vec<f64> {
     let count = (SECONDS / PERIOD) as usize;
     let tone = |t: f64, hz: f64, phase: f64| (2.0 * std::f64::consts::PI * hz * t + phase).sin() - phase.sin();

@@ -56,7 +56,7 @@ fn column_key(signal: &Signal, joint: &Joint) -> String {
 /// The pieces of a file before and behind rows that do not count: those from `from` up to `to`, which counts again. Rows of data are counted from 0.
 pub fn without(file: &str, from: usize, to: usize, rows: usize) -> String {
     let name = std::path::Path::new(file).file_name().map_or_else(|| file.to_string(), |name| name.to_string_lossy().into_owned());
-    // What is shorter says nothing.
+    // A shorter piece is no evidence.
     let piece = |key: &str, from: usize, to: usize| {
         (to > from + LEAST_ROWS).then(|| format!("\n{key} = {{ of = {name:?}, rows = [{from}, {to}] }}"))
     };

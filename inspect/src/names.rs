@@ -1,16 +1,16 @@
-//! What the name of a column says: quantity, joint, side, unit.
+//! The information in the name of a column: quantity, joint, side, unit.
 
 use crate::quantity::{Quantity, Side};
 use backdrive_plant::recording::units::{self, Unit};
 
-/// What a name says.
+/// The information in a name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
-    /// What it is; `None` where no word says it.
+    /// What it is; `None` where no word states it.
     pub quantity: Option<Quantity>,
     /// Which device of a pair.
     pub side: Option<Side>,
-    /// What is left of the name when all known words are taken away: the joint. Empty where nothing is left.
+    /// The rest of the name without all known words: the joint. Empty where nothing is left.
     pub joint: String,
     /// The unit that the name hints at, as in `pos_deg_1`.
     pub hint: Option<Unit>,

@@ -55,7 +55,7 @@ pub struct Signal {
     pub why: String,
     /// Which device of a pair.
     pub side: Option<Side>,
-    /// The joint; empty where the name says none.
+    /// The joint; empty where the name states none.
     pub joint: String,
     /// As it stands in the file, one a row of its stream.
     pub values: Vec<f64>,
@@ -79,7 +79,7 @@ impl Signal {
 /// One recording.
 #[derive(Debug, Clone, Default)]
 pub struct Recording {
-    /// The file as it was named, with the episode of a dataset.
+    /// The file by its given name, with the episode of a dataset.
     pub file: String,
     /// Its streams.
     pub streams: Vec<Stream>,

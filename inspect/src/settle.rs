@@ -1,4 +1,4 @@
-//! Findings beside each other: what follows from another finding is not told twice.
+//! Findings beside each other: a consequence of another finding is not reported twice.
 
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::recording::Recording;
@@ -21,7 +21,7 @@ pub fn limited(recording: &Recording, response: &Response, limit: &RateLimit) ->
     finding.todo("command slower motion, or state the limit in the drive: a linear model does not hold there").sure(0.9)
 }
 
-/// Takes out what another finding explains.
+/// Removes what another finding explains.
 pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
     let is = |finding: &Finding, kind: FindingKind| finding.kind == kind && finding.weight == Weight::Wrong;
     let exchanged: Vec<String> = findings.iter().filter(|f| is(f, FindingKind::JointsExchanged)).flat_map(|f| f.signals.clone()).collect();
@@ -45,7 +45,7 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
         }
         findings = kept;
     }
-    // Without its sign, a drive says nothing of lag; stuck or white, neither.
+    // Without its sign, a drive is no evidence of lag; nor is one that is stuck or white.
     let dead: Vec<String> = findings
         .iter()
         .filter(|f| is(f, FindingKind::Rectified) || is(f, FindingKind::Stuck) || is(f, FindingKind::Passive))
@@ -65,7 +65,7 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
     // A command in another unit than its position seems to stand still beside it.
     let in_other: Vec<Option<String>> = findings.iter().filter(|f| is(f, FindingKind::WrongUnit)).map(|f| f.joint.clone()).collect();
     findings.retain(|f| !(f.kind == FindingKind::Passive && in_other.contains(&f.joint)));
-    // What is broken by itself says nothing beside others until it is put right.
+    // A signal that is broken by itself is no evidence beside others until it is corrected.
     let broken: Vec<String> =
         findings.iter().filter(|f| f.weight == Weight::Wrong && is_broken(f.kind)).flat_map(|f| f.signals.clone()).collect();
     findings.retain(|f| !(is_pair(f.kind) && f.kind != FindingKind::Passive && touches(f, &broken)));

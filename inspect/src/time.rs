@@ -20,7 +20,7 @@ pub enum Found {
         /// Its heading.
         heading: String,
     },
-    /// Evenly spaced rows, so many per second.
+    /// Evenly spaced rows, the number per second.
     Rate(f64),
 }
 
@@ -28,7 +28,7 @@ pub enum Found {
 const FORWARD: f64 = 0.9;
 /// Steps of times vary by less than this share of them where only the data say that they are times.
 const STEADY: f64 = 0.5;
-/// Steps from which on bare numbers are not taken for seconds: nobody records joints more slowly than twice a second.
+/// Steps above which numbers without a unit are not taken for seconds: no recording of joints is slower than twice a second.
 const NO_SECONDS: f64 = 0.5;
 /// The slowest rate at which joints are recorded, Hz: of the units ms, us and ns the first that gives more is taken.
 const SLOWEST_HZ: f64 = 5.0;

@@ -40,7 +40,7 @@ pub(crate) enum Heard {
 pub(crate) struct Notice {
     /// Index of the node.
     pub node: usize,
-    /// Which of its lives: what a dead process said late is not its successor's.
+    /// Which of its lives: a late message of a dead process is not its successor's.
     pub life: u32,
     /// What was heard.
     pub heard: Heard,
@@ -141,7 +141,7 @@ impl Child {
         self.pid.as_raw()
     }
 
-    /// Tells it something. One that does not listen is not waited for.
+    /// Sends it words. One that does not listen is not waited for.
     pub fn tell(&self, words: &ToNode) {
         if let Ok(line) = serde_json::to_string(words) {
             let _ = self.to.try_send(line + "\n");
@@ -162,7 +162,7 @@ impl Child {
     }
 }
 
-/// Writes lines to a process until it is gone or nobody has anything to say to it.
+/// Writes lines to a process until it is gone or there is nothing left to send.
 async fn speak(mut stdin: ChildStdin, mut lines: mpsc::Receiver<String>) {
     while let Some(line) = lines.recv().await {
         if stdin.write_all(line.as_bytes()).await.is_err() {
@@ -179,7 +179,7 @@ struct Ear {
 
 impl Ear {
     async fn tell(&self, heard: Heard) {
-        // Nobody listens any more when the supervisor has given up; the pipes are read on all the same.
+        // There is no listener any more when the supervisor has given up; the pipes are read on nevertheless.
         let _ = self.notices.send(Notice { node: self.node, life: self.life, heard }).await;
     }
 }
@@ -218,7 +218,7 @@ async fn attend(
     };
     alive.store(false, Ordering::SeqCst);
     if !deaf && tokio::time::timeout(LAST_WORDS, &mut hearing).await.is_err() {
-        // What it has started still holds its pipes, and so its group: the id is nobody else's yet.
+        // What it has started still holds its pipes, and so its group: the id is not reused yet.
         let _ = killpg(pid, Signal::SIGKILL);
         let _ = tokio::time::timeout(LAST_WORDS, &mut hearing).await;
     }

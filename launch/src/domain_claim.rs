@@ -1,7 +1,7 @@
 //! One run of a machine speaks for a node in a ROS domain.
 //!
 //! Two runs that speak on the same topics refuse each other's messages, and each ends because of the other. Which of them goes on is decided before a node
-//! is started: a run binds a name for each of its nodes, which the system gives to one process alone and takes back when that ends, however it ends. The
+//! is started: a run binds a name for each of its nodes. The system gives the name to one process alone and frees it when that ends, however it ends. The
 //! names (abstract addresses of Unix sockets) belong to the network in which the machine's participants find each other, whoever their user is.
 
 use crate::error::LaunchError;

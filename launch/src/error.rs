@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-/// Why a run cannot start. What goes wrong after the start is told by [`crate::RunReport::cause`].
+/// Why a run cannot start. An error after the start is reported by [`crate::RunReport::cause`].
 #[derive(Debug, thiserror::Error)]
 pub enum LaunchError {
     /// The directory of the run cannot be made, read or removed.
@@ -10,7 +10,7 @@ pub enum LaunchError {
         path: PathBuf,
         /// What was tried.
         action: &'static str,
-        /// What the system says.
+        /// The system's message.
         reason: String,
         /// What to do.
         advice: &'static str,
@@ -35,7 +35,7 @@ pub enum LaunchError {
         node: String,
         /// The program.
         program: String,
-        /// What the system says.
+        /// The system's message.
         reason: String,
     },
     /// Signal handlers or timers cannot be set up.
@@ -43,7 +43,7 @@ pub enum LaunchError {
     Runtime {
         /// Such as `SIGINT`.
         what: &'static str,
-        /// What the system says.
+        /// The system's message.
         reason: String,
     },
     /// Some nodes did not find each other in time.
@@ -64,7 +64,7 @@ pub enum LaunchError {
         /// Its last lines on standard error.
         stderr: Vec<String>,
     },
-    /// A node said before the run began that it cannot do its work.
+    /// A node reported before the run began that it cannot do its work.
     #[error("node `{node}`: {error}")]
     NodeFailed {
         /// Name of the node.
@@ -77,7 +77,7 @@ pub enum LaunchError {
     /// The other hosts of a run cannot be looked for.
     #[error("cannot look for the other hosts: {reason}")]
     Network {
-        /// What the network says.
+        /// The network's message.
         reason: String,
     },
     /// Another run on this machine speaks for a node in the same ROS domain.

@@ -68,7 +68,7 @@ where
     };
     let Some(node) = graph.node(name) else { return fail(format!("the graph has no node \"{name}\""), 3) };
     if graph.timing.clock == Clock::Realtime && place.wire == Wire::Ros2 {
-        // Before the middleware's threads are made, which inherit it. What is refused here the node says later.
+        // Before the middleware's threads are made, which inherit it. The node reports later what is refused here.
         let _ = realtime::enter(&realtime::Options { priority: Some(MIDDLEWARE_PRIORITY), ..realtime::Options::default() });
     }
     let transport = match place.join(&paths, &graph, name) {
@@ -102,7 +102,7 @@ where
     let mut options = ProcessOptions::default();
     let expected = |t: GraphTopic| {
         let listeners = match (place.wire, &place.host) {
-            // In shared memory the bridge listens for all that are elsewhere.
+            // In shared memory the bridge listens for all nodes on other hosts.
             (Wire::Iceoryx2, Some(host)) => {
                 let here = listeners_on(&graph, &t.topic, host);
                 here + usize::from(here < t.listeners)
@@ -130,7 +130,7 @@ pub fn read_graph(paths: &RunPaths) -> Result<Graph, String> {
     Graph::from_text(&text, &path, &Overrides::default(), &Files::Disk).map_err(|e| e.to_string())
 }
 
-/// What a recorder of this graph hears, on this of its hosts if it has some, and what its bag says of the run.
+/// What a recorder of this graph hears, on this of its hosts if it has some, and its bag's description of the run.
 pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan, BagHeader) {
     let topics = topics(graph);
     let credit = (graph.timing.clock == Clock::Lockstep).then(|| (build::credit_topic(host), credit_listeners(graph)));
@@ -170,7 +170,7 @@ fn host() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").map(|s| s.trim().to_string()).unwrap_or_default()
 }
 
-/// Says why the node cannot begin, to the supervisor, or to whoever started it by hand.
+/// Reports why the node cannot begin, to the supervisor, or to the user who started it by hand.
 fn fail(error: String, code: u8) -> ExitCode {
     let line = serde_json::to_string(&FromNode::Failed { error: error.clone(), code });
     // A supervisor that is gone hears nothing, and that is no second error.

@@ -31,7 +31,7 @@ impl Member {
         }
     }
 
-    /// Takes what the node says of itself, and tells whether it has come further.
+    /// Takes the node's report on itself, and returns whether it has made progress.
     pub fn take_status(&mut self, mut status: NodeStatus, now: Instant) -> bool {
         status.missed_deadlines += self.before.0;
         status.lost += self.before.1;

@@ -70,8 +70,7 @@ pub enum OnDeath {
 /// What may be asked of a run while it lasts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
-    /// Change the gains. Asked before the start, it takes effect at the start; a node with gains that is
-    /// started again is told the last ones.
+    /// Change the gains. Asked before the start, it takes effect at the start; a node with gains that is restarted gets the last ones.
     Gains {
         /// Position scale.
         mu: f64,

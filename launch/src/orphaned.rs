@@ -1,7 +1,7 @@
 //! What the processes of a run do when their supervisor is gone: the last of them removes what the run has on the machine.
 //!
-//! Each holds a shared lock for as long as it lives. One that ends without a supervisor tries to hold it alone: who can is the last. A process
-//! that was killed has no such moment; what is left when all were killed goes with the next start.
+//! Each holds a shared lock for as long as it lives. One that ends without a supervisor tries to hold it alone: who can is the last. A process that
+//! was killed has no such moment; if all were killed, the next start removes what remains.
 
 use crate::paths::RunPaths;
 use crate::remains::{remove_file, remove_run, shm_files};

@@ -30,7 +30,7 @@ impl Pace {
         Some(std::mem::take(&mut self.held))
     }
 
-    /// Lines held back since the last one that passed, if it has been quiet for a second: so that the last ones are told too.
+    /// Lines held back since the last one that passed, if it has been quiet for a second: so that the last ones are shown too.
     pub fn settle(&mut self, now: Instant) -> Option<u64> {
         let quiet = now.saturating_duration_since(self.last) > Duration::from_secs(1);
         (quiet && self.held > 0).then(|| std::mem::take(&mut self.held))

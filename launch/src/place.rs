@@ -38,10 +38,10 @@ pub struct Place {
 }
 
 impl Place {
-    /// What the run directory says; shared memory where it says nothing.
+    /// The place in the run directory; shared memory where it has none.
     ///
     /// # Errors
-    /// What it says cannot be read.
+    /// Its content cannot be read.
     pub fn read(paths: &RunPaths) -> Result<Place, String> {
         let path = paths.place();
         match std::fs::read_to_string(&path) {

@@ -1,4 +1,4 @@
-//! What the system says of a process: whether it lives, whether it was stopped, whether it works.
+//! The system's information on a process: whether it lives, whether it was stopped, whether it works.
 
 /// A line of `/proc/PID/stat`, of a process that is not gone and does not only wait to be reaped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

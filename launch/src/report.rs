@@ -47,7 +47,7 @@ pub struct RunReport {
     pub unrecorded: Option<u64>,
     /// The bag, if one was recorded.
     pub bag: Option<PathBuf>,
-    /// Messages and bytes in the bag, as last told by the recorder.
+    /// Messages and bytes in the bag, as last reported by the recorder.
     pub recorded: Option<(u64, u64)>,
     /// In the order of the graph; nodes that share a process follow the one that leads it.
     pub nodes: Vec<NodeReport>,
@@ -74,14 +74,14 @@ pub struct NodeReport {
     pub name: String,
     /// Its kind.
     pub kind: String,
-    /// The last it said; missed deadlines and losses are summed over its lives, and the peak effort is that of the whole run.
-    /// `None` if it never said anything.
+    /// Its last report; missed deadlines and losses are summed over its lives, and the peak effort is that of the whole run. `None` if it never
+    /// reported anything.
     pub status: Option<NodeStatus>,
     /// How often it was started again.
     pub restarts: u32,
     /// How its last life ended, such as `done`.
     pub end: String,
-    /// Nodes that shared its process: what restarts and how it ended is said of is that process.
+    /// Nodes that shared its process: restarts and the cause of the end refer to that process.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub with: Vec<String>,
 }
@@ -89,11 +89,11 @@ pub struct NodeReport {
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunEvent {
-    /// The node that tells it, or `supervisor`.
+    /// The node that reports it, or `supervisor`.
     pub node: String,
     /// Time since step 0 at which it was heard, s; `None` if the run had not started.
     pub t_s: Option<f64>,
-    /// Step at which it happened; `None` if the supervisor tells it.
+    /// Step at which it happened; `None` if the supervisor reports it.
     pub step: Option<u64>,
     /// 0 info, 1 warning, 2 error.
     pub severity: u32,
@@ -112,7 +112,7 @@ pub struct Death {
     pub node: String,
     /// Time since step 0, s.
     pub t_s: f64,
-    /// Steps that it had told of.
+    /// Steps that it had reported.
     pub steps: u64,
     /// Such as `was killed by signal 11 (SIGSEGV)`.
     pub how: String,
@@ -155,10 +155,10 @@ pub enum Cause {
     Stranger {
         /// The node that refused it.
         node: String,
-        /// Who it is, as far as it is known, and where.
+        /// Who it is, if known, and where.
         text: String,
     },
-    /// A node said that it cannot go on.
+    /// A node reported that it cannot go on.
     NodeFailed {
         /// Name of the node.
         node: String,
@@ -170,7 +170,7 @@ pub enum Cause {
 }
 
 impl RunReport {
-    /// Whether every node did what it should until the run ended or was stopped. Says nothing of losses.
+    /// Whether every node did what it should until the run ended or was stopped. Losses do not count.
     pub fn orderly(&self) -> bool {
         matches!(self.cause, Cause::Completed | Cause::Stopped { .. }) && self.deaths.iter().all(|d| d.recovered) && self.killed.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The directory of a run, and the lock that says whether the run is alive.
+//! The directory of a run, and the lock that shows whether the run is alive.
 //!
 //! ```text
 //! <tmp>/backdrive-<uid>/<id>/
@@ -13,9 +13,9 @@
 //! /dev/shm/bd<id>_*      shared memory
 //! ```
 //!
-//! A process id can be reused and a process can be in another container; a lock belongs to whoever holds
-//! it and is free the moment that process is gone. So the lock alone says whether a run is alive.
-//! It is made first and removed last, so that wherever a supervisor is killed, what it leaves is seen to be dead.
+//! A process id can be reused and a process can be in another container; a lock belongs to whoever holds it and is free the moment that process is
+//! gone. So the lock alone shows whether a run is alive. It is made first and removed last, so that wherever a supervisor is killed, what it leaves
+//! is seen to be dead.
 
 use crate::error::LaunchError;
 use crate::paths::GRAPH;
@@ -200,7 +200,7 @@ impl RunHome {
         }
         if let Ok(stat) = nix::sys::statvfs::statvfs(&self.shm) {
             let free = stat.blocks_available().saturating_mul(stat.fragment_size());
-            // A file system without a size limit tells 0 blocks.
+            // A file system without a size limit reports 0 blocks.
             if stat.blocks() > 0 && free < need {
                 return Err(full(free));
             }
@@ -224,7 +224,7 @@ impl RunDir {
         &self.paths
     }
 
-    /// Tells the processes of the run where they meet.
+    /// Informs the processes of the run where they meet.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -234,7 +234,7 @@ impl RunDir {
         std::fs::write(&path, text).map_err(|e| failed(&path, "write it", e, "check that there is room and that you may write there"))
     }
 
-    /// Tells the processes of the run who they are on the network.
+    /// Informs the processes of the run who they are on the network.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,5 +1,5 @@
-//! Writes to standard error from a thread of its own: a terminal that is held (Ctrl-S), or a pipe that
-//! nobody reads, must not hold the supervisor and, through full pipes, the nodes.
+//! Writes to standard error from a thread of its own. A terminal that is held (Ctrl-S), or a pipe without a reader, must not hold the supervisor and,
+//! through full pipes, the nodes.
 
 use crate::status::Summary;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

@@ -9,12 +9,12 @@ use std::path::PathBuf;
 /// Who a run is on the network.
 #[derive(Debug, Clone)]
 pub(crate) struct Session {
-    /// What the processes of the run are told, and where.
+    /// Information for the processes of the run, and its place.
     pub known: Known,
     pub path: PathBuf,
     /// Differs from one start to the next, whatever the clock and the process ids say: what an earlier run has sent is worth nothing.
     pub nonce: String,
-    /// Shared by the hosts; on one host nobody's.
+    /// Shared by the hosts; unused on one host.
     pub secret: Key,
 }
 

@@ -17,7 +17,7 @@ const LAST_LINES: usize = 20;
 pub(crate) enum Phase {
     /// Started, not yet connected.
     Joining,
-    /// Connected, not yet told to start.
+    /// Connected, not yet started.
     Ready,
     /// In the loop.
     Running,
@@ -48,7 +48,7 @@ pub(crate) struct Slot {
     pub created: bool,
     pub missing: Vec<String>,
     pub done: bool,
-    /// What it said when it failed, and the exit code it asks for.
+    /// Its message when it failed, and the exit code it asks for.
     pub failed: Option<(String, u8)>,
     pub asked: Asked,
     pub asked_at: Instant,
@@ -59,7 +59,7 @@ pub(crate) struct Slot {
     /// When it was last heard.
     pub heard: Instant,
     pub silent: bool,
-    /// What the system said of the process last, while the run ends, and when it was last seen to work.
+    /// The system's last information on the process, while the run ends, and when it was last seen to work.
     pub stat: Option<ProcStat>,
     pub worked: Instant,
     /// When it was continued, because it had been stopped.
@@ -149,7 +149,7 @@ impl Slot {
         }
     }
 
-    /// Takes what a node of the process says of itself; one that it does not name is the first.
+    /// Takes the report of a node of the process on itself; one that it does not name is the first.
     pub fn take_status(&mut self, node: Option<&str>, status: NodeStatus, now: Instant) {
         let index = node.and_then(|name| self.members.iter().position(|m| m.node.name == name)).unwrap_or(0);
         if self.members.get_mut(index).is_some_and(|m| m.take_status(status, now)) {
@@ -166,7 +166,7 @@ impl Slot {
         self.members.first().and_then(|m| m.status.as_ref()).map_or(0, |s| s.steps)
     }
 
-    /// How its process ended, as it says itself or as the system says.
+    /// How its process ended, by its own report or the system's.
     pub fn how(&self, end: End) -> String {
         match (&self.failed, self.done) {
             (Some((error, _)), _) => error.clone(),

@@ -31,7 +31,7 @@ pub struct Summary {
     pub missed_deadlines: u64,
     /// Largest magnitude of effort in the last second, N.
     pub peak_effort: Option<f64>,
-    /// How far the loop is from its edge, such as `margin 2.4x at 71 Hz`.
+    /// The loop's stability margin, such as `margin 2.4x at 71 Hz`.
     pub margin: Option<String>,
     /// Bytes of the bag.
     pub bag_bytes: Option<u64>,

@@ -99,7 +99,7 @@ impl RunHome {
                     }
                 }
             }
-            // The directory goes last: as long as it is there, the next sweep tries again.
+            // The directory is removed last: while it is there, the next sweep tries again.
             if whole {
                 match remove_run(&dead.run.root, LOCK) {
                     Ok(()) => swept.removed.push(dead.run),

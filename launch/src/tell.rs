@@ -1,4 +1,4 @@
-//! What the supervisor tells a person during the run, and the report after it.
+//! What the supervisor shows a person during the run, and the report after it.
 
 use crate::member::Member;
 use crate::plan::Named;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// How long the pace is averaged.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// How long a start may take before it is said what it waits for.
+/// How long a start may take before the cause of the wait is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 impl Supervisor {
@@ -24,10 +24,10 @@ impl Supervisor {
         self.event(None, event);
     }
 
-    /// Keeps an event and shows it, unless its node tells too many.
+    /// Keeps an event and shows it, unless its node reports too many.
     pub fn event(&mut self, from: Option<usize>, event: RunEvent) {
         let now = Instant::now();
-        // While the run is stopped, nodes tell that others are gone; that is kept, but no news.
+        // While the run is stopped, nodes report that others are gone; that is kept, but no news.
         let aftermath = self.stopping && from.is_some() && event.severity < 2;
         let wanted = !aftermath && (event.severity > 0 || self.options.display != Display::Quiet);
         if wanted {
@@ -140,12 +140,12 @@ impl Supervisor {
         self.slots.iter().filter(|s| !s.plan.records).map(Slot::steps).max().unwrap_or(0)
     }
 
-    /// Of every node that has said how it does.
+    /// Of every node that has reported its state.
     fn statuses(&self) -> impl Iterator<Item = &NodeStatus> {
         self.slots.iter().flat_map(|s| &s.members).filter_map(|m| m.status.as_ref())
     }
 
-    /// Nodes other than the recorder that have said how they do.
+    /// Nodes other than the recorder that have reported their state.
     fn running(&self) -> impl Iterator<Item = (&Named, &NodeStatus)> {
         self.slots.iter().filter(|s| !s.plan.records).flat_map(|s| &s.members).filter_map(|m| Some((&m.node, m.status.as_ref()?)))
     }

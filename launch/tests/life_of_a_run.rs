@@ -1,4 +1,4 @@
-//! Runs of toy nodes from start to end, and what is left of them: nothing.
+//! Runs of toy nodes from start to end, and their remains: nothing.
 
 mod common;
 

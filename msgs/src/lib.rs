@@ -1,9 +1,8 @@
 //! What travels between the nodes of a graph.
 //!
-//! Everything is a fixed-layout `#[repr(C)]` value, so that it can cross shared memory without
-//! being copied or parsed, and has one ROS 2 form, so that bags and other machines see ordinary
-//! messages: [`Sample`] is a `sensor_msgs/msg/JointState`; [`Gains`], [`Event`], [`Status`] and
-//! [`Margin`] have twins in `msg/*.msg`. SI units; a rotational axis uses rad and N m.
+//! Everything is a fixed-layout `#[repr(C)]` value, so that it can cross shared memory without being copied or parsed. Each has one ROS 2 form, so
+//! that bags and other machines see ordinary messages. [`Sample`] is a `sensor_msgs/msg/JointState`; [`Gains`], [`Event`], [`Status`] and [`Margin`]
+//! have twins in `msg/*.msg`. SI units; a rotational axis uses rad and N m.
 
 pub mod ros;
 pub mod text;
@@ -18,8 +17,7 @@ pub const LAYOUT: u32 = 1;
 /// Most axes a device may have.
 pub const MAX_AXES: usize = 8;
 
-/// The value of a quantity that nobody measured. It is a NaN, never to be confused with 0; use
-/// [`measured`] to read a quantity.
+/// The value of a quantity that was not measured. It is a NaN, never to be confused with 0; use [`measured`] to read a quantity.
 pub const NOT_MEASURED: f64 = f64::NAN;
 
 /// `Some(value)` if the quantity was measured.
@@ -178,15 +176,14 @@ pub struct Status {
     pub missed_deadlines: u64,
     /// Samples found missing by sequence number, over all inputs.
     pub lost: u64,
-    /// Time from the start of a step's inputs being waited for to its outputs being sent, s: median since
-    /// the last status; in lockstep 0, for a lockstep bag holds nothing that the machine decides.
+    /// Time from the start of a step's inputs being waited for to its outputs being sent, s: median since the last status. In lockstep it is 0,
+    /// because a lockstep bag holds nothing that depends on the machine.
     pub loop_p50_s: f64,
     /// The same, 99th percentile, s.
     pub loop_p99_s: f64,
 }
 
-/// How far the running loop is from its edge, of the axis that is nearest to it; sent about ten times a second as
-/// [`Status`] is.
+/// The stability margin of the running loop, of the axis that is nearest to its limit; sent about ten times a second like [`Status`].
 ///
 /// A message of its own, so that what was recorded before there was one reads as it did.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
@@ -209,20 +206,20 @@ pub struct Margin {
     pub known: u32,
     /// The gain now in force, mu*lambda, no unit.
     pub gain: f64,
-    /// Times which the gain may rise until the loop is on its edge, no unit; with [`margin::ABOVE`] at least that many
-    /// times; else [`NOT_MEASURED`].
+    /// Factor by which the gain may rise until the loop is at its stability limit, no unit; with [`margin::ABOVE`] at least that factor; else
+    /// [`NOT_MEASURED`].
     pub factor: f64,
     /// Standard deviation of `factor`, as a share of it, or [`NOT_MEASURED`].
     pub deviation: f64,
-    /// What it would oscillate at on its edge, Hz; 0 for a loop that runs away without oscillating; or [`NOT_MEASURED`].
+    /// Frequency at which it would oscillate at its stability limit, Hz; 0 for a loop that runs away without oscillating; or [`NOT_MEASURED`].
     pub frequency_hz: f64,
     /// How fast the reflected force above 8 Hz dies now, 1/s; negative where it grows; [`NOT_MEASURED`] where nothing rings.
     pub decay_per_s: f64,
 }
 
-/// What [`Margin::known`] says.
+/// Values of [`Margin::known`].
 pub mod margin {
-    /// Nothing: there is no dither to tell it from.
+    /// Nothing: there is no dither to identify it with.
     pub const NO_DITHER: u32 = 0;
     /// Nothing: the slave touches nothing, or not for the 0.6 s of a window.
     pub const FREE: u32 = 1;
@@ -238,7 +235,7 @@ pub mod margin {
     pub const LATE: u32 = 6;
 }
 
-/// The 32-bit FNV-1a hash of a node's name: how a sample says who sent it without carrying a string.
+/// The 32-bit FNV-1a hash of a node's name: it identifies the sender of a sample without a string.
 pub const fn source_id(name: &str) -> u32 {
     let (bytes, mut hash, mut i) = (name.as_bytes(), 0x811c_9dc5_u32, 0);
     while i < bytes.len() {
@@ -259,7 +256,7 @@ pub enum Message {
     Event(Event),
     /// A node's health.
     Status(Status),
-    /// How far the loop is from its edge.
+    /// The loop's stability margin.
     Margin(Margin),
 }
 

@@ -1,11 +1,10 @@
 //! The ROS 2 form of every message: schema text, CDR both ways.
 //!
-//! A [`Sample`] is a plain `sensor_msgs/msg/JointState`, so that any tool shows it with nothing of
-//! ours installed: its stamp is the sample's, its arrays are as long as there are axes, what was not measured is a NaN.
-//! What JointState has no field for ([`Facts`]: step, sequence, source, flags) is said in messages of a type of their own,
-//! [`STEPS`], wherever counting on does not tell it. Older bags have it in `header.frame_id`
-//! (`step=123 seq=123 src=89abcdef axes=2 flags=0 layout=1`), with an empty array for a quantity that no axis has;
-//! both are read. The other kinds have types of their own in `msg/`.
+//! A [`Sample`] is a plain `sensor_msgs/msg/JointState`, so that any tool shows it without our software. Its stamp is the sample's, its arrays are as
+//! long as there are axes, and a quantity that was not measured is a NaN. What JointState has no field for ([`Facts`]: step, sequence, source, flags)
+//! is written in messages of a type of their own, [`STEPS`], wherever it does not follow by counting on. Older bags have it in `header.frame_id`
+//! (`step=123 seq=123 src=89abcdef axes=2 flags=0 layout=1`), with an empty array for a quantity that no axis has; both are read. The other kinds
+//! have types of their own in `msg/`.
 //!
 //! Every payload is a 4-byte encapsulation header, `00 01 00 00`, and little-endian CDR.
 
@@ -63,9 +62,8 @@ pub fn kind_of(type_name: &str) -> Option<Kind> {
 
 /// Writes the payload of `message` into `payload`, replacing what was there (its memory is reused).
 ///
-/// `axis_names` become `JointState.name`; missing ones are called `axis0`, `axis1`, … and names beyond
-/// the message's axes are left out. Of a sample its [`Facts`] are not in it: see [`encode_steps`]. Errors: none for any value of `message` as it is built today; the
-/// encoder's own are passed on.
+/// `axis_names` become `JointState.name`; missing ones are called `axis0`, `axis1`, … and names beyond the message's axes are left out. Of a sample its
+/// [`Facts`] are not in it: see [`encode_steps`]. Errors: none for any value of `message` that can be built today; the encoder's own are passed on.
 pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -> Result<(), RosError> {
     payload.clear();
     payload.extend_from_slice(&ENCAPSULATION);
@@ -82,7 +80,7 @@ pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -
     .map_err(|source| RosError::Cdr { type_name: schema(message.kind()).0, source })
 }
 
-/// Writes into `payload` what is to be said of `sample`, and of those that follow it on `topic`, replacing what was there.
+/// Writes the facts of `sample`, and of those that follow it on `topic`, into `payload`, replacing what was there.
 ///
 /// Errors: as of [`encode`].
 pub fn encode_steps(topic: &str, sample: &Sample, payload: &mut Vec<u8>) -> Result<(), RosError> {
@@ -104,8 +102,7 @@ pub fn header_holds(stamp_ns: i64) -> bool {
     time::Time::from_ns(stamp_ns).to_ns() == stamp_ns
 }
 
-/// Reads a sample that [`encode`] wrote, of which `facts` are known from elsewhere. One that carries its own, as in older bags, is read
-/// by those.
+/// Reads a sample that [`encode`] wrote, with `facts` from another source. One that carries its own, as in older bags, is read by those.
 ///
 /// Errors: as of [`decode`].
 pub fn decode_sample(payload: &[u8], facts: &Facts) -> Result<Sample, RosError> {

@@ -67,7 +67,7 @@ fn there_and_back(message: &Message, payload: &mut Vec<u8>) -> Message {
             ros::encode_steps("/t", sent, &mut said).expect("it encodes");
             let (topic, facts) = ros::decode_steps(&said).expect("it decodes");
             assert_eq!(topic, "/t");
-            // The header says the time of all but those that it cannot hold.
+            // The header holds the time of all but those that it cannot represent.
             let facts = Facts { stamp_ns: facts.stamp_ns.filter(|stamp| !ros::header_holds(*stamp)), ..facts };
             Message::Sample(ros::decode_sample(&bytes, &facts).expect("it decodes"))
         }
@@ -198,7 +198,7 @@ fn the_older_form_is_read() {
     sent.effort[0] = -1.5;
     let Message::Sample(back) = ros::decode(Kind::Sample, &payload).expect("it decodes") else { panic!("another kind came back") };
     assert!(back.same_bits(&sent), "{back:?}");
-    // Its own word counts, whatever else is said.
+    // Its own content takes precedence over other facts.
     let other = Facts { layout: 9, source: 9, step: 9, sequence: 9, flags: 9, stamp_ns: Some(9) };
     assert!(ros::decode_sample(&payload, &other).expect("it decodes").same_bits(&sent));
 }

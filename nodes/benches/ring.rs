@@ -1,6 +1,5 @@
-//! How much our transport costs: a lockstep loop through five processes with a recorder listening to all
-//! of it, against bytes going round a ring of five processes through pipes; the same with the bag written, with nodes
-//! that share processes, and a hop between two processes that poll.
+//! Cost of our transport: a lockstep loop through five processes with a recorder listening to all of it, against bytes going round a ring of five
+//! processes through pipes. Also the same with the bag written, with nodes that share processes, and a hop between two processes that poll.
 //!
 //! `cargo bench -p backdrive-nodes --bench ring [-- LOOPS RUNS]`. The runs are interleaved and medians
 //! compared, for on a shared machine only ratios of neighbouring runs mean anything. One loop crosses

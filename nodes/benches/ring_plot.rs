@@ -3,8 +3,8 @@
 //!
 //!     cargo bench -p backdrive-nodes --bench ring_plot -- docs/ring.svg [LOOPS ROUNDS]      (from the root; without a file nothing is drawn)
 //!
-//! Every kind of ring passes one message round, and its first member looks at the same clock once per loop. A tenth as many loops as count go
-//! before them. The kinds take turns, and medians over the rounds are told. A sample of ours has one size, so that over sizes it is a point.
+//! Every kind of ring passes one message round, and its first member looks at the same clock once per loop. A tenth as many loops as count go before
+//! them. The kinds take turns, and medians over the rounds are reported. A sample of ours has one size, so that over sizes it is a point.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -157,7 +157,7 @@ fn table(over: &str, columns: &[usize], kinds: &[Vec<(usize, Figures)>; 4]) {
     }
 }
 
-/// What the first member of our ring measured, told after its loop's end.
+/// The measurements of the first member of our ring, reported after its loop's end.
 static MEASURED: OnceLock<Figures> = OnceLock::new();
 
 /// Passes on what it is given.
@@ -231,12 +231,12 @@ fn member(name: &str, location: &Location, steps: u64, nodes: &str) -> Result<Ex
     Ok(code)
 }
 
-/// Steps for so many loops that count: as many looks at the clock as there are steps.
+/// Steps for this number of loops that count: as many clock readings as there are steps.
 fn steps(loops: u64) -> u64 {
     warm_up(loops) + loops + 1
 }
 
-/// The other way round.
+/// The inverse.
 fn counted(of: u64) -> u64 {
     (1..of).rev().find(|loops| steps(*loops) <= of).unwrap_or(1)
 }

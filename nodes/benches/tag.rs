@@ -1,4 +1,4 @@
-//! What a tag costs: a sample encoded as it is and with its tag, read as it is and after its tag was checked.
+//! The cost of a tag: a sample encoded without and with its tag, read directly and after its tag was checked.
 //!
 //!   cargo bench -p backdrive-nodes --bench tag
 

@@ -1,6 +1,6 @@
-//! What a node tells beside its samples: events, gains and status, as the messages they become.
+//! What a node reports beside its samples: events, gains and status, as the messages they become.
 //!
-//! The processes and the single-process executor share it, so that both tell the same.
+//! The processes and the single-process executor share it, so that both report the same.
 
 use crate::sentences::sentence;
 use crate::stage::{Clock, Timing};
@@ -25,7 +25,7 @@ pub(crate) struct Book {
     margin_due: u64,
 }
 
-/// What a status says that the node must look up.
+/// The parts of a status that the node must look up.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Health {
     pub missed_deadlines: u64,
@@ -64,7 +64,7 @@ impl Book {
         Event { layout: LAYOUT, source: self.source, step, sequence, stamp_ns, severity, reserved: 0, value, kind: Text::new(kind), text }
     }
 
-    /// Takes out what a core has noted, one message each.
+    /// Removes what a core has noted, one message each.
     pub fn drain(&mut self, step: u64, stamp_ns: i64, noted: &mut Events, mut each: impl FnMut(&'static str, Event)) {
         let dropped = std::mem::take(&mut noted.dropped);
         for (kind, value, severity) in noted.drain() {
@@ -76,7 +76,7 @@ impl Book {
         }
     }
 
-    /// The gains in force at `step`, if they differ from those told last.
+    /// The gains in force at `step`, if they differ from those last reported.
     pub fn gains(&mut self, step: u64, stamp_ns: i64, now: (f64, f64)) -> Option<Gains> {
         let bits = |g: (f64, f64)| (g.0.to_bits(), g.1.to_bits());
         if self.gains_told.is_some_and(|told| bits(told) == bits(now)) {
@@ -148,7 +148,7 @@ impl Wanted {
         }
     }
 
-    /// Takes out the next that holds from `step` or earlier, in order of step.
+    /// Removes the next that holds from `step` or earlier, in order of step.
     #[inline]
     pub fn due(&mut self, step: u64) -> Option<Gains> {
         if self.len == 0 {

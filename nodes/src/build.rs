@@ -38,13 +38,13 @@ const AHEAD_OF_RECORDER: u64 = 1024;
 /// Steps by which a source may run ahead of its listeners in lockstep where nothing records.
 const AHEAD_OF_LISTENERS: u64 = 256;
 
-/// Topic on which a recorder says how far it has come; each host's has its own.
+/// Topic on which a recorder reports its progress; each host's has its own.
 pub fn credit_topic(host: Option<&str>) -> Topic {
     let name = host.map_or("/recorder/credit".to_string(), |host| format!("/recorder/credit_{host}"));
     Topic { name, kind: Kind::Sample }
 }
 
-/// Topic on which a host's supervisor tells of the other hosts: their clocks, and when they are gone.
+/// Topic on which a host's supervisor reports on the other hosts: their clocks, and when they are gone.
 pub fn host_topic(host: &str) -> Topic {
     Topic { name: format!("/host_{host}/events"), kind: Kind::Event }
 }
@@ -258,7 +258,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             _ => Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s),
         })],
         Settings::Scaling { dither, guard } => {
-            // What a dither shakes is no oscillation of the loop's own.
+            // The effect of a dither is no oscillation of the loop's own.
             let peak = dither.iter().flatten().fold(0.0_f64, |peak, d| peak.max(d.abs()));
             let guard = guard.then(|| Guard::new(node.axes, GUARD_LEAST_FORCE.max(peak), period_s));
             vec![

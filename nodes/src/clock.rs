@@ -2,7 +2,7 @@
 
 use nix::libc;
 
-/// When step 0 is due, as the supervisor tells every node.
+/// When step 0 is due, as the supervisor announces it to every node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Start {
     /// CLOCK_MONOTONIC, ns.

@@ -75,7 +75,7 @@ impl Input {
         self.subscriber.set_awaited(awaited);
     }
 
-    /// Takes in what has arrived, and tells whether the port is satisfied for `step`.
+    /// Takes in what has arrived, and returns whether the port is satisfied for `step`.
     pub fn poll(&mut self, step: u64) -> Result<bool, TransportError> {
         let Some(wanted) = step.checked_sub(self.delay) else {
             return Ok(true);
@@ -140,8 +140,8 @@ impl Input {
     }
 }
 
-/// Steps since the sample that should be here at `step` on a connection that lags by `lag` steps: 0
-/// before the first can be here, and counted as if step -1 had been the last while there is none.
+/// Steps since the sample that should be here at `step` on a connection that lags by `lag` steps. It is 0 before the first can be here, and counted
+/// as if step -1 had been the last while there is none.
 pub(crate) fn age(step: u64, lag: u64, held: Option<u64>) -> u64 {
     match (step.checked_sub(lag), held) {
         (None, _) => 0,

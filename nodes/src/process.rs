@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How a process runs, beyond what the graph says.
+/// How a process runs, beyond the settings of the graph.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProcessOptions {
     /// Of the loop.
@@ -35,16 +35,16 @@ pub(crate) const GRACE: Duration = Duration::from_secs(3);
 /// Time from the supervisor's death to the end of a node whose loop does not end by itself.
 const ORPHANED: Duration = Duration::from_millis(700);
 
-/// Runs a node as this process until its steps are done, the supervisor stops it or is gone, or it fails.
-/// The last line that it says is `done` or `failed`; the exit code is 0 or that of the failure.
+/// Runs a node as this process until its steps are done, the supervisor stops it or is gone, or it fails. Its last line of output is `done` or
+/// `failed`; the exit code is 0 or that of the failure.
 ///
 /// `listeners` names how many listeners each topic has in the graph: the node is ready when they are all there.
 pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
     run_processes(vec![plan], timing, transport, options)
 }
 
-/// The same for nodes that share this process and its thread. What is said of the first is said as of a process of its own, and of
-/// the others by their names ([`FromNode::Of`]).
+/// The same for nodes that share this process and its thread. Lines about the first have the form of a process of its own, and those about the others
+/// carry their names ([`FromNode::Of`]).
 pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
     let others: Vec<String> = plans.iter().skip(1).map(|p| p.name.clone()).collect();
     let line = Line::open(ORPHANED, others.clone());
@@ -78,7 +78,7 @@ pub(crate) struct Line {
     writer: Mutex<Option<JoinHandle<()>>>,
 }
 
-/// Told often, said seldom.
+/// Reported often, printed rarely.
 #[allow(clippy::large_enum_variant)]
 enum Out {
     Told(Told),
@@ -102,9 +102,8 @@ impl Line {
             let _ = signal(Signal::SIGINT, SigHandler::SigIgn);
             let _ = signal(Signal::SIGTERM, SigHandler::Handler(on_terminate));
         }
-        // The end of standard input tells that the supervisor is gone, but not to a process that is
-        // stopped: its death wakes it up. (The kernel sends this when the starting *thread* ends, so
-        // nothing that ends the process may be used here.)
+        // The end of standard input shows that the supervisor is gone, but not to a process that is stopped: its death wakes it up. (The kernel sends
+        // this when the starting *thread* ends, so nothing that ends the process may be used here.)
         let _ = nix::sys::prctl::set_pdeathsig(Signal::SIGCONT);
         let control = Arc::new(Control::default());
         let (to_start, start) = sync_channel(1);
@@ -124,7 +123,7 @@ impl Line {
         Line { control, start, out, writer: Mutex::new(Some(writer)) }
     }
 
-    /// Passes on what a loop tells; never blocks. What does not fit is dropped: it has been published as well.
+    /// Passes on what a loop reports; never blocks. What does not fit is dropped: it has been published as well.
     pub fn tell(&self, told: Told) {
         let _ = self.out.try_send(Out::Told(told));
     }
@@ -134,7 +133,7 @@ impl Line {
         let _ = self.out.send(Out::Said(Box::new(message)));
     }
 
-    /// Says `created`, then `ready` once nothing is missing, and waits for the start. `None` when stopped before.
+    /// Prints `created`, then `ready` once nothing is missing, and waits for the start. `None` when stopped before.
     ///
     /// # Errors
     /// Those of `missing`, which is asked until the start.
@@ -163,7 +162,7 @@ impl Line {
         }
     }
 
-    /// Does the work and says how it ended, last of all; the work's ports are gone by then.
+    /// Does the work and reports how it ended, last of all; the work's ports are gone by then.
     pub fn supervised(&self, work: impl FnOnce(&Line) -> Result<NodeStatus, RunError>) -> ExitCode {
         let result = work(self);
         let (last, code) = match result {
@@ -178,7 +177,7 @@ impl Line {
     }
 }
 
-/// Writes one line per message; ends after the last one, or when nobody reads any more.
+/// Writes one line per message; ends after the last one, or when the reader is gone.
 fn write_lines(said: &Receiver<Out>, others: &[String]) {
     let others: Vec<(u32, &String)> = others.iter().map(|name| (source_id(name), name)).collect();
     let mut stdout = std::io::stdout().lock();
@@ -216,7 +215,7 @@ fn spell(told: Told, others: &[(u32, &String)]) -> FromNode {
     }
 }
 
-/// Does what the supervisor says, until it says no more.
+/// Follows the supervisor's commands until their end.
 fn read_lines(control: &Control, start: &SyncSender<Start>) {
     for line in std::io::stdin().lock().lines() {
         let Ok(line) = line else { return };

@@ -6,7 +6,8 @@ use backdrive_msgs::{Margin, margin, measured};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Kind of the event that somebody who is not of the run sends on one of its topics. Where that topic moves something, as severity 2 says, the run ends.
+/// Kind of the event that somebody who is not of the run sends on one of its topics. Where that topic moves something, which is severity 2, the run
+/// ends.
 pub const STRANGER: &str = "stranger";
 
 /// From the supervisor to a node.
@@ -80,7 +81,7 @@ pub enum FromNode {
     },
 }
 
-/// How a node is doing. Small and without a heap, for it is told while stepping.
+/// How a node is doing. Small and without a heap, because it is sent while stepping.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct NodeStatus {
     /// Steps done.
@@ -100,19 +101,19 @@ pub struct NodeStatus {
     pub peak_effort: f64,
     /// Only the recorder: messages written and bytes of the bag so far.
     pub recorded: Option<(u64, u64)>,
-    /// Only the scaling: how far the loop is from its edge.
+    /// Only the scaling: the loop's stability margin.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<MarginStatus>,
 }
 
-/// How far the loop is from its edge, as [`Margin`] tells it.
+/// The loop's stability margin, as in [`Margin`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarginStatus {
     /// One of [`margin`].
     pub known: u32,
     /// mu*lambda now in force.
     pub gain: f64,
-    /// Times which it may rise until the loop is on its edge; with [`margin::ABOVE`] at least that many.
+    /// Factor by which it may rise until the loop is at its stability limit; with [`margin::ABOVE`] at least that factor.
     pub factor: Option<f64>,
     /// Standard deviation of the factor, as a share of it.
     pub deviation: Option<f64>,

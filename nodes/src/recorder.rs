@@ -1,9 +1,9 @@
-//! The recorder: hears every topic, takes everything over in time, and slows nobody down.
+//! The recorder: hears every topic, takes everything over in time, and delays no other node.
 //!
-//! It polls rather than wakes, so a publisher never pays for it. When a message arrived does not depend on when the recorder looked:
-//! the transport knows it ([`Subscriber::arrived_ns`]), and messages go to the sink in that order. In lockstep it says on its credit topic
-//! up to which step it has everything; sources wait for that, so the graph cannot outrun it and nothing
-//! is ever lost. In real time the buffers cover the time between two polls many times over, and a hole is counted.
+//! It polls rather than wakes, so a publisher never pays for it. When a message arrived does not depend on when the recorder looked: the transport
+//! knows it ([`Subscriber::arrived_ns`]), and messages go to the sink in that order. In lockstep it reports on its credit topic up to which step it
+//! has everything; sources wait for that, so the graph cannot outrun it and nothing is ever lost. In real time the buffers cover the time between two
+//! polls many times over, and a hole is counted.
 
 use crate::clock::{Start, now_ns};
 use crate::process::{GRACE, Line};
@@ -25,7 +25,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Messages of one topic that it takes before it looks at the next.
 const AT_ONCE: usize = 512;
 
-/// After a stop, or when nobody speaks any more, how long it still listens.
+/// After a stop, or when all publishers are silent, how long it still listens.
 const LINGER: Duration = Duration::from_millis(50);
 
 /// How long it still listens after a stop while others speak on: it was asked to end alone, and has a bag to close.
@@ -79,10 +79,10 @@ pub struct RecorderPlan {
     pub name: String,
     /// What it records, in the order of the sink's topic numbers.
     pub topics: Vec<Topic>,
-    /// Lockstep: where it says how far it has come, and how many sources listen to that.
+    /// Lockstep: where it reports its progress, and how many sources listen to that.
     pub credit: Option<(Topic, usize)>,
-    /// Real time: whether times of arrival are told by the wall clock of this host, as they must be where it is one of several whose clocks
-    /// are compared. Otherwise they count from the start of the run, as stamps do, and no setting of the clock puts one before its stamp.
+    /// Real time: whether arrival times use the wall clock of this host, as they must where it is one of several whose clocks are compared. Otherwise
+    /// they count from the start of the run, as stamps do, and no setting of the clock puts one before its stamp.
     pub by_wall_clock: bool,
 }
 
@@ -262,9 +262,8 @@ impl RunningRecorder {
         NodeStatus { steps: self.steps(), lost, refused, recorded: Some((written, bytes)), ..NodeStatus::default() }
     }
 
-    /// Takes over until every topic has reached the last of `steps`, or `stopped` says so; then what is still
-    /// on its way. `start` is that of the nodes: times of arrival count from it as their stamps do. `tell` hears of losses and, about
-    /// ten times a second, of progress.
+    /// Takes over until every topic has reached the last of `steps`, or `stopped` is set; then what is still on its way. `start` is that of the
+    /// nodes: times of arrival count from it as their stamps do. `tell` receives losses and, about ten times a second, progress.
     ///
     /// # Errors
     /// A subscriber or the sink fails.
@@ -329,7 +328,7 @@ impl RunningRecorder {
     /// Closes the bag.
     ///
     /// # Errors
-    /// The sink cannot be ended, or messages were lost: then the error says how many.
+    /// The sink cannot be ended, or messages were lost: then the error gives their number.
     pub fn finish(self) -> Result<NodeStatus, RunError> {
         let report = self.report();
         let completeness = self.sink.finish()?;
@@ -340,8 +339,8 @@ impl RunningRecorder {
     }
 }
 
-/// Records as this process until every topic has reached its last step, or the supervisor says stop (see [`crate::process::run_process`]).
-/// The exit code is 4 when messages were lost.
+/// Records as this process until every topic has reached its last step, or the supervisor stops it (see [`crate::process::run_process`]). The exit
+/// code is 4 when messages were lost.
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
     Line::open(GRACE, Vec::new()).supervised(|line| {
         let mut recorder = RunningRecorder::new(plan, timing, transport, sink)?;

@@ -1,10 +1,10 @@
-//! What each kind of event says to a person. A kind without a line here says its own name.
+//! The sentence for each kind of event, for a person. A kind without a line here shows its own name.
 
 use backdrive_msgs::measured;
 use backdrive_msgs::text::Text;
 use std::fmt::Write;
 
-/// Kind, what to say before the number, and after it. Without a second part the number is not said.
+/// Kind, the text before the number, and after it. Without a second part the number is not shown.
 const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("canceller_off", "the canceller's prediction is not finite: it no longer subtracts, since", Some("s")),
     ("connection_broken", "a message could not be sent or received", None),

@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Why a graph cannot run in one thread.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SequenceError {
-    /// Nobody speaks on an input's topic.
+    /// An input's topic has no publisher.
     #[error("node `{node}`: nobody publishes {topic}")]
     NoPublisher {
         /// Who listens.
@@ -128,7 +128,7 @@ impl Sequence {
         }
         let slot_of = |topic: &Topic| topics[..axes.len()].iter().position(|t| t.name == topic.name);
 
-        // How far back anyone looks at each output.
+        // How far back any reader looks at each output.
         let mut depth = vec![0; axes.len()];
         let (mut wired, mut first_slot) = (Vec::new(), 0);
         for place in &order {
@@ -286,7 +286,7 @@ impl Sequence {
 }
 
 impl Node {
-    /// What it tells beside its samples, in the order in which a process sends it.
+    /// What it reports beside its samples, in the order in which a process sends it.
     fn tell(&mut self, stage: &Stage, step: u64, stamp_ns: i64, noted: &mut Events, tap: Tap) {
         let events = self.events;
         self.book.drain(step, stamp_ns, noted, |_, event| tap(events, &Message::Event(event)));

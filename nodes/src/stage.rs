@@ -83,9 +83,9 @@ pub struct NodePlan {
     pub status: Topic,
     /// Where wanted gains come from, if a stage has gains.
     pub gains_in: Option<Topic>,
-    /// Where the gains in force are told, if a stage has gains: at step 0 and whenever they change.
+    /// Where the gains in force are published, if a stage has gains: at step 0 and whenever they change.
     pub gains_out: Option<Topic>,
-    /// Where the loop's margin is told ten times a second, if a stage knows of it.
+    /// Where the loop's margin is published ten times a second, if a stage knows of it.
     pub margin_out: Option<Topic>,
 }
 

@@ -1,4 +1,4 @@
-//! Graph files with a coupling: its keys, and a coupling in the place of scaling.
+//! Graph files with a coupling: its keys, and a coupling instead of scaling.
 
 use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides, Settings, coupling::conditions};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ fn with(law: &str) -> Overrides {
     Overrides { coupling: Some(law.into()), ..Overrides::default() }
 }
 
-/// The graph of `launch/coupling.toml` with other text in the place of some.
+/// The graph of `launch/coupling.toml` with some of its text replaced.
 fn changed(from: &str, to: &str) -> Result<Graph, String> {
     let path = file("launch/coupling.toml");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -43,7 +43,7 @@ fn what_is_wrong_is_said_with_what_there_is() {
     assert!(key.contains("impedence") && key.contains("impedance"), "{key}");
     let range = error("impedance = 20.0", "impedance = -1.0");
     assert!(range.contains("impedance"), "{range}");
-    // Tables of laws that are not in force are read all the same.
+    // Tables of laws that are not in force are read nevertheless.
     let other = error("impedance = 20.0", "impedance = 20.0\n[nodes.four_channel]\ncompensation = 1.0");
     assert!(other.contains("compensation") && other.contains("below 1"), "{other}");
     let hand = changed("law = \"wave\"", "law = \"four_channel\"").and_then(|_| {

@@ -1,4 +1,4 @@
-//! What a bag holds of a graph says nothing of the machine, and is the same graph.
+//! A graph in a bag does not identify the machine, and is the same graph.
 
 use backdrive_nodes::graph::{Files, Graph, Overrides};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! A real-time recorder tells of every message when it arrived, in that order, however seldom it looks.
+//! A real-time recorder records when every message arrived, in that order, however rarely it polls.
 
 mod common;
 

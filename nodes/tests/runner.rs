@@ -133,7 +133,7 @@ fn real_time_goes_on_without_a_peer_and_takes_its_successor_in() {
     assert!(skipped > 0 || seen.len() == 600);
     let oldest = seen.iter().map(|s| s.2).max().unwrap();
     assert!((50..600).contains(&oldest), "the age grew to {oldest} steps");
-    // Heard to the end: a sample that is some steps late on a busy machine is no loss. What the first one said last is some 150.
+    // Heard to the end: a sample that is some steps late on a busy machine is no loss. The last report of the first one is some 150.
     assert!(seen.last().unwrap().1.is_some_and(|held| held >= 500), "{:?}", seen.last());
     for (step, held, age) in seen.iter() {
         assert_eq!(*age, held.map_or(step + 1, |held| step - held));

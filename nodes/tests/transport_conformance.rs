@@ -212,7 +212,7 @@ fn odd_sample(sequence: u64) -> Sample {
     sample
 }
 
-/// The sequence number of the first sample that does not arrive as it was sent.
+/// The sequence number of the first sample that arrives changed.
 fn first_difference(world: &dyn World, sender: &mut dyn Publisher, receiver: &mut dyn Subscriber) -> Option<u64> {
     (0..1000).find(|sequence| {
         sender.send(&Message::Sample(odd_sample(*sequence))).unwrap();
@@ -461,7 +461,7 @@ fn tells_when_each_message_came(world: &dyn World, _: &dyn World) {
     for (before, after) in sent {
         assert!(next(world, &mut *receiver).is_some());
         let (arrived, latest) = (receiver.arrived_ns(), if world.arrives_at_once() { after } else { now_ns() });
-        // What the middleware says by the wall clock is true to the microsecond.
+        // The middleware's wall-clock time is true to the microsecond.
         assert!((before - 1_000..=latest).contains(&arrived), "sent from {before} to {after}, came at {arrived}");
         assert!(arrived >= last);
         last = arrived;
@@ -475,7 +475,7 @@ fn two_listeners_get_everything(world: &dyn World, _: &dyn World) {
     assert!(eventually(world, || first.has_publisher() && second.has_publisher() && sender.listeners() == 2));
     (0..64).for_each(|i| sender.send(&sample(i)).unwrap());
     assert_eq!(sequences(world, &mut first, 64), (0..64).collect::<Vec<_>>());
-    // One that is not awaited is kept all the same.
+    // One that is not awaited is kept nevertheless.
     second.set_awaited(false);
     assert_eq!(sequences(world, &mut second, 64), (0..64).collect::<Vec<_>>());
 }
@@ -558,7 +558,7 @@ mod killed {
             let mut child = start("publisher", &world.0);
             let mut heard = Vec::new();
             until_ready(&mut child, || heard.extend(sequences(&world, &mut receiver, 0)));
-            // Nothing is promised of a publisher that nobody has met alive.
+            // Nothing is guaranteed for a publisher that no receiver has met alive.
             assert!(receiver.has_publisher(), "the publisher has died of itself");
             child.kill().unwrap();
             child.wait().unwrap();
@@ -574,7 +574,7 @@ mod killed {
 mod strangers {
     use super::*;
 
-    /// What a subscriber of the run says of messages that `transport` sends on its topic of forces, none of which it takes.
+    /// The report of a subscriber of the run on messages that `transport` sends on its topic of forces, none of which it takes.
     fn said_of(domain: &Domain, mut transport: Ros2) -> (String, bool) {
         let mut run = domain.join("run");
         let mut receiver = run.subscriber(&samples(), 64, true).unwrap();

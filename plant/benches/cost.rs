@@ -1,10 +1,10 @@
-//! What a step costs over the number of bodies and of friction contacts: a chain of masses on springs and dampers, some of which rub on the ground, pushed by
-//! a sine at its end so that contacts slide, stop and stick.
+//! Cost of a step over the number of bodies and of friction contacts. The model is a chain of masses on springs and dampers, some of which rub on the ground.
+//! A sine pushes its end so that contacts slide, stop and stick.
 //!
 //!     cargo bench -p backdrive-plant --bench cost -- docs/step-cost.svg      (from the root; without a file nothing is drawn)
 //!
-//! Prints microseconds per step of one substep (the fastest of several rounds), and the exponent of a power of the number of bodies fitted from 8 bodies on,
-//! and of the number of contacts from 2 on.
+//! Prints microseconds per step of one substep (the fastest of several rounds). Also prints the exponent of a power of the number of bodies fitted from 8
+//! bodies on, and of the number of contacts from 2 on.
 
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment};

@@ -2,8 +2,8 @@
 //!
 //!     cargo bench -p backdrive-plant --bench tangents
 //!
-//! For each law, of one body and of three: nanoseconds per substep of the plant alone, and how many plants alone the plant with its derivatives takes
-//! (differences take nine), where the law's own numbers are among the eight and where they are not. Medians of 15 interleaved runs.
+//! For each law, of one body and of three: nanoseconds per substep of the plant alone, and the cost of the plant with its derivatives in units of
+//! that (differences take nine). Both are given with the law's own parameters among the eight and without. Medians of 15 interleaved runs.
 
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, Tangents};

@@ -1,7 +1,7 @@
 //! Devices as networks of bodies and elements.
 //!
-//! A [`model::Model`] is what a model file says. It compiles to a stepper, is linearised, is driven
-//! by a recording or an excitation, and takes fragments (a grip, an environment) at a port.
+//! A [`model::Model`] is the content of a model file. It compiles to a stepper, is linearised, is driven by a recording or an excitation, and takes
+//! fragments (a grip, an environment) at a port.
 
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]

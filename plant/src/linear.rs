@@ -1,8 +1,7 @@
 //! A model as a linear system about rest: modes, poles, frequency responses.
 //!
-//! Elements that are not linear are replaced by what they look like to a sine of a stated amplitude
-//! ([`Operating`]), so one model gives a stiff linkage at small amplitude and a soft one at large. A delay
-//! acts on frequency responses and not on poles.
+//! Elements that are not linear are replaced by their equivalent for a sine of a stated amplitude ([`Operating`]), so one model gives a stiff linkage
+//! at small amplitude and a soft one at large. A delay acts on frequency responses and not on poles.
 
 pub use crate::elements::DryFriction as Friction;
 
@@ -15,7 +14,7 @@ use std::f64::consts::TAU;
 /// Below this a force at a point has no lever on a joint, m or 1: rounding leaves that much.
 const NO_LEVER: f64 = 1e-9;
 
-/// The sine at which elements that are not linear are looked at.
+/// The sine at which elements that are not linear are evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Operating {
     /// Amplitude of the displacement across each such element, m or rad, above 0.
@@ -25,8 +24,8 @@ pub struct Operating {
     pub frequency_hz: f64,
     /// How dry friction enters.
     pub friction: Friction,
-    /// Displacement about which an element is looked at, by index, m or rad; 0 where none is given. A wall that is
-    /// 5 mm away is free space unless its displacement is put beyond 5 mm here.
+    /// Displacement about which an element is evaluated, by index, m or rad; 0 where none is given. A wall that is 5 mm away is free space unless its
+    /// displacement is put beyond 5 mm here.
     pub about: Vec<(usize, f64)>,
 }
 
@@ -42,7 +41,7 @@ impl Operating {
     }
 }
 
-/// Why a model cannot be looked at as a linear system.
+/// Why a model cannot be treated as a linear system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LinearError {
     /// Amplitude or frequency of the operating sine is not above 0.
@@ -279,8 +278,8 @@ impl<'a> LinearModel<'a> {
         Ok(matrix)
     }
 
-    /// Force on a body per force of an element, N per N or N m per N: of an element at a point of a robot what it is on a joint at the pose, `Jᵀ`. 0 where
-    /// it does not reach the body, or there is no such element.
+    /// Force on a body per force of an element, N per N or N m per N; for an element at a point of a robot its effect on a joint at the pose, `Jᵀ`. 0
+    /// where it does not reach the body, or there is no such element.
     pub fn force_share(&self, element: usize, body: usize) -> f64 {
         let share = |place: Place| match place {
             Some(end) if end == body => 1.0,
@@ -346,7 +345,7 @@ impl<'a> LinearModel<'a> {
         s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)]
     }
 
-    /// What an output says of that.
+    /// The value of an output in that response.
     fn read(&self, output: usize, Answer { motion, force }: &Answer, frequency_hz: f64) -> Complex<f64> {
         let (output, s) = (&self.model.outputs[output], Complex::new(0.0, TAU * frequency_hz));
         let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);

@@ -1,8 +1,9 @@
 //! What loads a friction contact: the joint whose force it passes on.
 //!
 //! - Friction between two bodies: the springs between these two.
-//! - Friction between a body and ground, as of a screw in its bearing, a gear on its shaft or a cable in its guide: the springs between this body
-//!   and another, the first other body that the model's elements join it with. Where they join it with none, its springs to ground.
+//! - Friction between a body and ground, as of a screw in its bearing, a gear on its shaft or a cable in its guide. The load is the force of the
+//!   springs between this body and another, the first other body that the model's elements join it with. Where they join it with none, its springs to
+//!   ground.
 //!
 //! Springs are all elements whose force depends on displacement: linear ones, those along a path, and constant forces beside them. Dampers,
 //! inerters and dry friction in the joint do not count. Where there is no such joint the load is 0.
@@ -10,7 +11,7 @@
 use crate::elements::{Law, Role};
 use crate::model::{Element, Model, Place};
 
-/// The elements whose forces make the load of a friction contact, by index, each with the sign (1 or -1) that makes it positive where it resists
+/// The elements whose forces make the load of a friction contact, by index. Each has the sign (1 or -1) that makes it positive where it resists
 /// motion of the contact forwards (of the first end of `element` against the second).
 pub fn joint(model: &Model, element: usize) -> Vec<(usize, f64)> {
     let Some(contact) = model.elements.get(element) else { return Vec::new() };

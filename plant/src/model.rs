@@ -58,7 +58,8 @@ impl Model {
 pub struct Body {
     /// Unique in the model.
     pub name: String,
-    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible, or for a joint of a robot, whose links have theirs, and for a point of one.
+    /// kg or kg m², at least 0. It is 0 only where an inerter or a motion input makes that possible, for a joint of a robot, whose links have theirs, and for a
+    /// point of one.
     pub inertia: f64,
 }
 
@@ -118,18 +119,18 @@ pub struct Input {
     pub gain: f64,
     /// Then the limit of its magnitude, N or N m; infinite when there is none.
     pub saturation: f64,
-    /// Then a delay, s. Of a motion it may be negative: the body was ahead of what the recording says; see [`crate::stepper::ahead`].
+    /// Then a delay, s. For a motion it may be negative: the body was ahead of the recording; see [`crate::stepper::ahead`].
     pub delay: f64,
     /// Then a first-order lag of this corner, Hz; infinite when there is none.
     pub bandwidth: f64,
     /// Force lost in proportion to the driven body's velocity, behind delay and lag, N per m/s.
     pub back_emf: f64,
-    /// Of a motion, m: where the body is when the recording says 0, as an encoder that counts from where it was switched on.
+    /// For a motion, m: where the body is when the recorded value is 0, as with an encoder that counts from where it was switched on.
     pub offset: f64,
 }
 
 impl Input {
-    /// A signal that reaches its body as it is: nothing of an actuator's gain, limit, delay or lag.
+    /// A signal that reaches its body unchanged: without an actuator's gain, limit, delay or lag.
     pub fn ideal(name: &str, kind: InputKind, on: usize, hold: Hold) -> Input {
         Input {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Recording sets: a folder of recordings, with `set.toml` saying which may be fitted and which may not be seen.
+//! Recording sets: a folder of recordings, with a `set.toml` that states which may be fitted and which are held out.
 
 use crate::elements::Range;
 use crate::recording::{Cell, Columns, JointColumns, Piece, Recording, read_columns, read_csv, read_joints};
@@ -53,7 +53,7 @@ pub struct RecordingSet {
     pub held_out: Vec<String>,
     /// How the device starts.
     pub initial: Initial,
-    /// Inputs of the model that nobody measured: name, and Hz up to which they vary. They are no columns of the files.
+    /// Inputs of the model that were not measured: name, and Hz up to which they vary. They are no columns of the files.
     pub unknown: Vec<(String, f64)>,
     /// Names and units in the files.
     pub columns: Columns,
@@ -89,7 +89,7 @@ impl RecordingSet {
         }
     }
 
-    /// A set of recordings that nothing else is said of: all are for fitting, from rest, their columns as they are named. `fit` is relative to the
+    /// A set of recordings without further statements: all are for fitting, from rest, their columns as they are named. `fit` is relative to the
     /// folder.
     pub fn of_recordings(folder: PathBuf, fit: Vec<String>) -> RecordingSet {
         RecordingSet {
@@ -113,7 +113,7 @@ impl RecordingSet {
         self.folder.join(source_of(&self.files, file))
     }
 
-    /// What is particular to a file; the defaults where the set says nothing.
+    /// What is particular to a file; the defaults where the set has no entry.
     pub fn rules_of(&self, file: &str) -> FileRules {
         self.files.iter().find(|f| f.0 == file).map(|f| f.1.clone()).unwrap_or_default()
     }
@@ -260,7 +260,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
     })
 }
 
-/// The inputs that nobody measured.
+/// The inputs that were not measured.
 fn read_unknown(mut table: Table) -> Result<Vec<(String, f64)>, FileError> {
     let mut inputs = Vec::new();
     for name in table.keys() {

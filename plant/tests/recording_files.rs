@@ -66,7 +66,7 @@ fn a_heading_may_name_its_unit_and_so_may_a_rule() {
     let model = Model::from_toml(MOTOR, "motor.toml").unwrap();
     assert_eq!(r.check_units(&model), Ok(()));
 
-    // What a set says goes before what the heading says; a current becomes a torque by its constant, a count an angle by its size.
+    // The set takes precedence over the heading; a current becomes a torque by its constant, a count an angle by its size.
     let set = "[columns]\nt = { column = 'time', unit = 'us' }\ntorque = { column = 'i', unit = 'mA', scale = 0.05 }\n\
                angle = { column = 'encoder', unit = 'counts', scale = 1.5e-3 }\n";
     let text = "time,i,encoder\n0,1000,0\n100,2000,1000\n200,3000,2000\n";

@@ -164,14 +164,14 @@ fn fixed_links_are_one_body_with_what_carries_them() {
     tree.place(&[std::f64::consts::FRAC_PI_2], &mut work);
     let tip = tree.link_placement(2, &work).unwrap().translation;
     assert!((tip - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-15);
-    // Seen from elsewhere it is the same body.
+    // Seen from another frame it is the same body.
     let seen = Inertia::new(0.4, tool.centre, tool.about_centre).outside(&Placement::at(Vector3::new(0.5, 0.0, 0.0)));
     assert!((seen.rotational[(1, 1)] - (1e-3 + 0.4 * 0.25)).abs() < 1e-14);
 }
 
 #[test]
 fn a_frictionless_arm_keeps_its_energy() {
-    // Runge and Kutta's rule of fourth order: what is left shrinks by 16 as its step halves.
+    // Runge and Kutta's rule of fourth order: the error shrinks by 16 as its step halves.
     let tree = Tree::new(&rods(&[(1.7, 0.6), (0.8, 0.45), (0.5, 0.3)])).unwrap();
     let drift = |steps: usize| {
         let (mut q, mut v, h) = (vec![0.3, 0.5, -1.0], vec![1.0, -2.0, 3.0], 1.0 / steps as f64);

@@ -1,4 +1,4 @@
-//! Robot files: what is read of URDF and MJCF, what is said of the rest, and what they are refused with.
+//! Robot files: what is read of URDF and MJCF, the remarks on the rest, and the errors of refused files.
 
 mod robot_common;
 

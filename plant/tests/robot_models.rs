@@ -212,7 +212,7 @@ fn the_robots_of_this_folder_can_be_shown_and_moved() {
     assert_eq!(shown.not_linear, None);
     assert!(check(&model, &Operating::small()).iter().all(|remark| remark.severity != Severity::Error));
     assert_eq!(Model::from_toml(&model.to_toml(), "again").unwrap(), model);
-    // Let go, it swings and comes to rest.
+    // After its release it swings and comes to rest.
     let mut plant = Plant::new(&model, 1e-3, &Options::default()).unwrap();
     (0..6000).for_each(|_| plant.step(&[]));
     assert!(

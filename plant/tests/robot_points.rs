@@ -50,7 +50,7 @@ fn jacobian(q: [f64; 2]) -> [[f64; 2]; 2] {
     [[-0.6 * q[0].sin() + outer[0], outer[0]], [0.6 * q[0].cos() + outer[1], outer[1]]]
 }
 
-/// The rods, their joints led, with a push on the tip.
+/// The rods, their joints on prescribed motion, with a push on the tip.
 fn led() -> Model {
     let mut rest = String::new();
     for joint in ["joint0", "joint1"] {

@@ -260,7 +260,7 @@ fn leading_a_joint_is_work() {
 
 #[test]
 fn a_frictionless_arm_neither_gains_nor_loses_energy() {
-    // Three rods that tumble: the error of the energy goes with the square of the step, and does not grow with time.
+    // Three rods that tumble: the error of the energy is proportional to the square of the step, and does not grow with time.
     let model = arm(&[(1.7, 0.6), (0.8, 0.45), (0.5, 0.3)], "", "");
     let worst = |substeps: usize| {
         let mut plant = Plant::new(&model, 1e-3, &options(substeps)).unwrap();
@@ -288,7 +288,7 @@ fn a_frictionless_arm_neither_gains_nor_loses_energy() {
 fn accelerations_and_reactions_are_those_of_the_tree() {
     let tree = Tree::new(&rods(&RODS)).unwrap();
     let mut work = tree.workspace();
-    // Free: what forward dynamics says.
+    // Free: the result of forward dynamics.
     let pose = "pose = { joint0 = 0.4, joint1 = -0.9 }";
     let push = "[[inputs]]\nname = 'push'\nkind = 'force'\non = 'joint0'\n";
     let mut plant = Plant::new(&arm(&RODS, pose, push), 1e-3, &options(2)).unwrap();
@@ -299,7 +299,7 @@ fn accelerations_and_reactions_are_those_of_the_tree() {
     let mut accelerations = [0.0; 2];
     tree.forward_dynamics(&q, &v, &[3.0, 0.0], &mut work, &mut accelerations);
     assert!(share(&[plant.acceleration(0), plant.acceleration(1)], &accelerations) < 1e-12);
-    // Led along a motion: what inverse dynamics says.
+    // Prescribed motion: the result of inverse dynamics.
     let mut led = String::new();
     for i in 0..2 {
         led += &format!(
@@ -319,7 +319,7 @@ fn accelerations_and_reactions_are_those_of_the_tree() {
 
 #[test]
 fn a_joint_that_is_led_moves_the_others() {
-    // The first joint swings as told; the second hangs on it, and does what the whole tree does when the first is pushed with the reaction.
+    // The first joint swings as prescribed; the second hangs on it, and does what the whole tree does when the first is pushed with the reaction.
     let led = arm(
         &RODS,
         "",

@@ -106,7 +106,7 @@ fn parameters(model: &Model) -> Vec<(String, usize, f64)> {
             all.extend(values.iter().enumerate().map(|(i, value)| (format!("elements.{}.{}", element.name, parameter.key), i, *value)));
         }
     }
-    // From 0 some have a derivative to one side only: round edges of a gap are another law, and a spring without a rest length leaves a joint unloaded.
+    // From 0 some have a derivative to one side only: round ends of a gap are another law, and a spring without a rest length leaves a joint unloaded.
     all.retain(|(.., value)| *value != 0.0);
     all
 }

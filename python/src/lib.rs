@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Runs a verb: `(exit code, standard output, notes, error or None)`. `progress(message, position, length or None)` is called now and then.
 ///
 /// # Errors
-/// What a signal handler or `progress` raises, such as `KeyboardInterrupt`; the verb is then told to stop.
+/// Any exception from a signal handler or `progress`, such as `KeyboardInterrupt`; the verb is then asked to stop.
 #[pyfunction]
 #[pyo3(signature = (arguments, progress = None))]
 fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> PyResult<(u8, String, Vec<String>, Option<String>)> {
@@ -32,7 +32,7 @@ fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> P
     let result = Mutex::new(result);
     let theirs = caller.clone();
     std::thread::Builder::new().name("backdrive".to_string()).spawn(move || {
-        // Nobody listens any more where the call was interrupted.
+        // There is no listener any more where the call was interrupted.
         let _ = done.send(call(&arguments, &theirs));
     })?;
     let gone = || PyRuntimeError::new_err("the work ended with a fault of backdrive's own; what it said of it stands on standard error");

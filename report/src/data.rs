@@ -1,7 +1,7 @@
 //! What the script in the page is given of a figure: each stack of plots as JSON, in the units that its axes show.
 //!
-//! Numbers are rounded to less than a ten-thousandth of their axis and long series are thinned for the widest drawing: a page stays small, and
-//! what is read off it is right to more digits than can be seen.
+//! Numbers are rounded to less than a ten-thousandth of their axis and long series are thinned for the widest drawing. A page stays small, and its
+//! values are right to more digits than can be seen.
 
 use crate::limits::{self, Scale, drawable};
 use crate::number::{axis_scale, number, power_of_ten};
@@ -71,7 +71,7 @@ struct SeriesData {
     x: Vec<f64>,
     #[serde(serialize_with = "short")]
     y: Vec<f64>,
-    /// The other edge of a band, the radii of discs.
+    /// The other boundary of a band, the radii of discs.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "short_if_any")]
     z: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -152,7 +152,7 @@ impl Shown {
         Self { scale, factor, unit, decimals }
     }
 
-    /// As it is written; NaN (which JSON writes as null) for what cannot stand on this axis.
+    /// The value that is written; NaN (which JSON writes as null) for what cannot stand on this axis.
     fn round(&self, value: f64) -> f64 {
         let shown = value / self.factor;
         if !drawable(value, self.scale.log) {

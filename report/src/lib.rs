@@ -1,8 +1,8 @@
 //! Self-contained reports: one HTML file with figures that opens offline. Knows data only, nothing of robots.
 //!
-//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: nothing is
-//! fetched, the same data give the same bytes. It reads in light and dark, on a narrow screen and in print. Figures tell their values
-//! where one points, show and hide curves by their legend, and zoom; a reader without scripts gets their numbers in a table.
+//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: nothing is fetched, the same data give
+//! the same bytes. It reads in light and dark, on a narrow screen and in print. Figures show their values at the pointer, show and hide curves by
+//! their legend, and zoom; a reader without scripts gets their numbers in a table.
 //!
 //! ```
 //! use backdrive_report::{Page, Plot, Tone};
@@ -16,9 +16,9 @@
 //! assert!(page.html().contains("The swing dies out."));
 //! ```
 //!
-//! Apache ECharts draws (`vendor/` says why it and which build of it); it stands in the page, once, if there is a figure. Ours is which
-//! figures a page has and what they say: `plot` is the data, `limits` chooses from where to where the axes go, `thin` makes long series
-//! short without losing their extremes, `data` writes them into the page, and `figures.js` there hands them to the library.
+//! Apache ECharts draws (`vendor/` gives the reason and its build); it stands in the page, once, if there is a figure. This crate decides which
+//! figures a page has and their content: `plot` is the data, `limits` chooses the ranges of the axes, `thin` makes long series short without losing
+//! their extremes. `data` writes them into the page, and `figures.js` there hands them to the library.
 
 mod data;
 mod escape;

@@ -2,10 +2,10 @@
 
 use crate::style::Tone;
 
-/// A colour by its role; the page's style sheet says what it looks like in a light and in a dark scheme.
+/// A colour by its role; the page's style sheet defines its look in a light and in a dark scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Colour {
-    /// The next one of the palette (Okabe and Ito's, which colour-blind readers can tell apart).
+    /// The next one of the palette (Okabe and Ito's, which colour-blind readers can distinguish).
     #[default]
     Auto,
     /// The one of the palette with this number, to pair a band with its line.
@@ -18,7 +18,7 @@ pub enum Colour {
     Muted,
 }
 
-/// How a line is broken, so that lines can be told apart without colour.
+/// How a line is broken, so that lines can be distinguished without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Dash {
     /// The first line whole, each further one by a pattern of its own.
@@ -43,8 +43,8 @@ pub(crate) enum Kind {
     Bars,
 }
 
-/// One set of data with its name in the legend. Vectors of different length are drawn up to the shorter one, and the plot says so.
-/// What is not finite is left out and breaks a line.
+/// One set of data with its name in the legend. Vectors of different length are drawn up to the shorter one, and the plot states this. What is not
+/// finite is left out and breaks a line.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub(crate) name: String,
@@ -96,13 +96,13 @@ impl Series {
         Self::new(name, x, lower, Kind::Band { upper: upper.to_vec() })
     }
 
-    /// The area that the discs cover together: centres (re, im) and radii in units of x. Meant for equal aspect, as uncertainty discs in
-    /// a Nyquist plot; elsewhere they become ellipses.
+    /// The area that the discs cover together: centres (re, im) and radii in units of x. Meant for equal aspect, as uncertainty discs in a Nyquist
+    /// plot; with another aspect they become ellipses.
     pub fn discs(name: &str, re: &[f64], im: &[f64], radius: &[f64]) -> Self {
         Self::new(name, re, im, Kind::Discs { radius: radius.to_vec() })
     }
 
-    /// A bar from 0 (from the lower edge on a logarithmic axis) to y at each x, as wide as the narrowest distance in x allows.
+    /// A bar from 0 (from the lower end of a logarithmic axis) to y at each x, as wide as the narrowest distance in x allows.
     pub fn bars(name: &str, x: &[f64], y: &[f64]) -> Self {
         Self::new(name, x, y, Kind::Bars)
     }
@@ -256,13 +256,13 @@ impl Plot {
         self
     }
 
-    /// Makes the x axis logarithmic. Values that are not positive are left out, and the plot says how many.
+    /// Makes the x axis logarithmic. Values that are not positive are left out, and the plot states their number.
     pub fn x_log(mut self) -> Self {
         self.x.log = true;
         self
     }
 
-    /// Makes the y axis logarithmic. Values that are not positive are left out, and the plot says how many.
+    /// Makes the y axis logarithmic. Values that are not positive are left out, and the plot states their number.
     pub fn y_log(mut self) -> Self {
         self.y.log = true;
         self

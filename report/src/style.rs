@@ -1,6 +1,6 @@
 //! What roles look like: tones, palette, the style sheet.
 
-/// What a colour says. The same tone is the same colour in the lead sentence, in tables and in plots.
+/// The meaning of a colour. The same tone is the same colour in the lead sentence, in tables and in plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, PartialOrd, Ord)]
 pub enum Tone {
     /// Nothing: the colour of the text.
@@ -14,7 +14,7 @@ pub enum Tone {
     Bad,
     /// Something else decided, for instance a limiter.
     Limited,
-    /// Cannot be told.
+    /// Cannot be decided.
     Unsure,
 }
 
@@ -32,7 +32,7 @@ impl Tone {
     }
 }
 
-/// How many colours the palette has; beyond them it begins anew.
+/// How many colours the palette has; after them the first one follows again.
 pub const PALETTE: usize = 7;
 
 /// Colours. The palette is Okabe and Ito's (2008); in the dark scheme its dark members are lightened, and as text on white the tones are

@@ -130,7 +130,7 @@ impl Table {
     }
 }
 
-/// Whether a cell begins like a number (`-1.2 mm`, `≥ 50`, `∞`) or says that there is none.
+/// Whether a cell begins like a number (`-1.2 mm`, `≥ 50`, `∞`) or marks that there is none.
 fn like_a_number(text: &str) -> bool {
     let rest = text.trim_start_matches(['-', '−', '+', '±', '≥', '≤', '<', '>', '~', '≈', '.', ' ']);
     rest.starts_with(|c: char| c.is_ascii_digit() || c == '∞') || matches!(text, "–" | "-" | "—")

@@ -42,8 +42,8 @@ pub struct Thinned {
     pub dense: bool,
 }
 
-/// A line in pixels as it is drawn in `window`. Where x never turns back, each pixel column keeps its first, lowest, highest and last
-/// point; elsewhere points closer than a third of a pixel to the one before go, and what has been drawn already is not drawn again.
+/// A line in pixels for `window`. Where x never turns back, each pixel column keeps its first, lowest, highest and last point. In other places,
+/// points closer than a third of a pixel to the one before are dropped, and what has been drawn already is not drawn again.
 pub fn line(points: impl Iterator<Item = (f64, f64)>, window: Rect) -> Thinned {
     let mut out: Vec<Vec<(f64, f64)>> = Vec::new();
     for stroke in strokes(points) {
@@ -65,7 +65,7 @@ pub fn line(points: impl Iterator<Item = (f64, f64)>, window: Rect) -> Thinned {
 /// How far a point may lie off the straight line between its neighbours and still be left out, px.
 const STRAIGHT: f64 = 0.06;
 
-/// Without the points that the eye cannot tell from the straight line between those kept (Ramer, Douglas and Peucker).
+/// Without the points that the eye cannot distinguish from the straight line between those kept (Ramer, Douglas and Peucker).
 fn straightened(stroke: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let ends = [0, stroke.len().saturating_sub(1)];
     let mut keep: Vec<bool> = (0..stroke.len()).map(|i| ends.contains(&i)).collect();
@@ -139,8 +139,8 @@ fn distinct(stroke: &[(f64, f64)]) -> Vec<(f64, f64)> {
     out
 }
 
-/// The strokes left when points are rounded to half pixels and a segment that was drawn before is not drawn again: a trace that winds
-/// round many times costs no more than the area it covers.
+/// The remaining strokes when points are rounded to half pixels and a segment that was drawn before is not drawn again. A trace that winds round many
+/// times costs no more than the area it covers.
 fn new_segments(stroke: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let round = |p: &(f64, f64)| ((2.0 * p.0).round() as i64, (2.0 * p.1).round() as i64);
     let at = |c: (i64, i64)| (c.0 as f64 / 2.0, c.1 as f64 / 2.0);
@@ -207,7 +207,7 @@ fn cut(stroke: &[(f64, f64)], window: Rect) -> Vec<Vec<(f64, f64)>> {
     out
 }
 
-/// A band in pixels as (x, one edge, the other), x never turning back: per pixel column its outermost points, one stretch between gaps.
+/// A band in pixels as (x, one boundary, the other), x never turning back: per pixel column its outermost points, one stretch between gaps.
 pub fn band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<Vec<(f64, f64, f64)>> {
     let mut stretches: Vec<Vec<(f64, f64, f64)>> = vec![Vec::new()];
     for (x, a, b) in points {

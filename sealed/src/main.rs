@@ -108,7 +108,7 @@ impl Options {
     }
 }
 
-/// A sentence and the exit code that it ends with: 2 for what was asked, 3 for what a file says, 5 for what the system says.
+/// A sentence and the exit code that it ends with: 2 for a wrong request, 3 for the content of a file, 5 for an error of the system.
 struct Failure(String, u8);
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! The hidden plant as the master of a graph: what goes in and comes out at a sample, and nothing else.
+//! The hidden plant as the master of a graph: its inputs and outputs at a sample, and nothing else.
 
 use crate::network::{InputKind, Network};
 use crate::plant::{PlantError, SealedPlant, StepError};
@@ -61,7 +61,7 @@ pub enum MasterError {
 /// One axis at a sample. In a run-away all are NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// m at the tip, what the position sensor says, with noise and encoder steps.
+    /// m at the tip, the position sensor's output, with noise and encoder steps.
     pub measured: f64,
     /// m, of the body that the hand holds. Like the next two, a simulation knows it and a session may not.
     pub position: f64,
@@ -97,7 +97,7 @@ pub struct SealedMaster {
 }
 
 impl SealedMaster {
-    /// The device that `truth` makes of the nominal model, held as [`Network::held`] says or not at all, at rest.
+    /// The device that `truth` makes of the nominal model, held by [`Network::held`] or not at all, at rest.
     ///
     /// # Errors
     ///

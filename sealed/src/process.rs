@@ -9,7 +9,7 @@ use crate::master::{Reading, SealedMaster};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// What the process says first; the number is the version of the protocol.
+/// The process's first output; the number is the version of the protocol.
 pub const GREETING: &str = "backdrive-sealed 1";
 
 /// A device of more axes than this is a mistake of the other end.
@@ -83,10 +83,10 @@ pub enum RemoteError {
     Start {
         /// The program.
         program: String,
-        /// What the system says.
+        /// The system's message.
         error: io::Error,
     },
-    /// It said something else first. Why it ended stands in its own error output.
+    /// Its first output was something else. Why it ended stands in its own error output.
     #[error("the hidden plant did not begin as it should but with \"{0}\"; its error output says why")]
     Greeting(String),
     /// It ended or a pipe broke.
@@ -94,10 +94,10 @@ pub enum RemoteError {
     Pipe(#[from] io::Error),
 }
 
-/// The hidden plant of another process, as whoever drives it sees it.
+/// The hidden plant of another process, as its driver sees it.
 pub struct RemoteMaster {
     child: Child,
-    /// `None` once the process has been told to end.
+    /// `None` once the process has been asked to end.
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
     asked: Vec<u8>,
@@ -173,7 +173,7 @@ impl Drop for RemoteMaster {
     /// Ends the process and waits for it.
     fn drop(&mut self) {
         drop(self.input.take());
-        // Its input has ended, so it ends; there is nobody to tell how.
+        // Its input has ended, so it ends; there is no receiver for its status.
         let _ = self.child.wait();
     }
 }

@@ -18,7 +18,7 @@ pub fn seal(truth: &Truth) -> Result<(Vec<u8>, String), TruthError> {
     Ok((bytes, hash))
 }
 
-/// SHA-256 of bytes in hexadecimal: whoever opens the truth later holds it against what was printed.
+/// SHA-256 of bytes in hexadecimal: a reader who opens the truth later compares it with what was printed.
 pub fn hash(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(64);
     for byte in Sha256::digest(bytes) {

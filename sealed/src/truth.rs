@@ -22,11 +22,11 @@ pub struct Truth {
     pub seed: u64,
     /// What is hidden.
     pub effects: Vec<Effect>,
-    /// Numbers of the nominal model that are wrong, by path (`elements.cable.stiffness`): the true value over the nominal one.
+    /// Parameters of the nominal model that are wrong, by path (`elements.cable.stiffness`): the true value over the nominal one.
     pub numbers: BTreeMap<String, f64>,
     /// The hand that holds it, against the nominal grip.
     pub hand: Hand,
-    /// How each output is measured; outputs that are not listed are as the model says, without noise.
+    /// How each output is measured; outputs that are not listed are those of the model, without noise.
     pub sensors: Vec<Sensor>,
     /// Seed of the sensors' noise.
     pub noise_seed: u64,
@@ -63,7 +63,7 @@ pub enum TruthError {
     /// The form is of another version.
     #[error("the truth file has schema {found}; this program reads {SCHEMA}: use the program that wrote it")]
     Schema {
-        /// What the file says.
+        /// The schema number in the file.
         found: u32,
     },
     /// It was drawn for another model or grip.
@@ -118,7 +118,7 @@ impl Truth {
         Ok(truth)
     }
 
-    /// The true device: the nominal one with true numbers, the true hand, true sensors' steps and what is hidden.
+    /// The true device: the nominal one with true parameters, the true hand, true sensors' steps and the hidden effects.
     ///
     /// # Errors
     ///

@@ -126,7 +126,7 @@ fn a_gap_carries_nothing_inside_and_the_shaft_outside() {
     let rows = run(&mut plant, 4000, 1e-3, |t| vec![1e-3 * (t + 1e-3)]);
     assert!(rows[..900].iter().all(|row| row[0] == 0.0));
     near(rows[2999][0], 5000.0 * (3e-3 - 1e-3) + 10.0 * 1e-3, 1e-6);
-    // Rounded: the same far away, and the closed form at the edge.
+    // Rounded: the same far away, and the closed form at the end of the gap.
     let (k, gap, w) = (5000.0, 2e-3, 1e-4);
     let law = RoundedGap { gap, rounding: w, stiffness: k, damping: 0.0 };
     let network = device(RAM);
@@ -319,7 +319,7 @@ fn a_constant_force_whose_reaction_the_held_body_takes_is_a_hand_elsewhere() {
         truth.effects[0].accept.iter().filter(same).count()
     };
     assert_eq!((hidden(&truths[0], ["drum", "handle"]), hidden(&truths[1], ["drum", "ground"])), (1, 1));
-    // What the second pulls at the handle, the hand's spring gives back where the hand stands off by force/stiffness.
+    // The hand's spring balances the pull of the second at the handle, where the hand stands off by force/stiffness.
     let spring = network.elements.iter().find_map(|e| match &e.law {
         Law::Spring(spring) if e.of_grip => Some(spring.stiffness),
         _ => None,

@@ -146,7 +146,7 @@ fn one_bristle() {
 
 #[test]
 fn a_gap_with_sharp_edges_in_a_joint() {
-    // The shaft's end as a state of its own, stopped at the edges.
+    // The shaft's end as a state of its own, stopped at the ends of the gap.
     let (k, c, gap) = (4000.0, 6.0, 1e-3);
     let force = swept(2.0);
     let rows = runge_kutta(1500, force, |[x, v, end]: &[f64; 3], f| {

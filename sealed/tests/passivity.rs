@@ -1,4 +1,4 @@
-//! No law that takes energy gives any, and a spring gives back no more than it took.
+//! No law that takes energy gives any, and a spring returns no more than it took.
 
 mod common;
 
@@ -6,7 +6,7 @@ use backdrive_sealed::laws::*;
 use backdrive_sealed::plant::SealedPlant;
 use common::*;
 
-/// Laws of every kind that should not give energy to whoever moves them.
+/// Laws of every kind that should not give energy to a body that moves them.
 fn laws() -> Vec<Law> {
     let (k, c, vs) = (4000.0, 2.0, 5e-3);
     vec![

@@ -32,7 +32,7 @@ pub struct Answer {
     pub found: Searched,
     /// Errors of every judged record: its name, and of the command, the base and the diagnosed joint the nrmse and the mean absolute error.
     pub judged: Vec<Judged>,
-    /// Whether those are records that no fit has seen.
+    /// Whether those are held-out records.
     pub is_held_out: bool,
 }
 
@@ -60,7 +60,7 @@ pub struct Found {
     pub notes: Vec<String>,
 }
 
-/// A joint that hardly moves in a record, rad or m: its nrmse there says nothing.
+/// A joint that hardly moves in a record, rad or m: its nrmse there is not used.
 const MOVES: f64 = 1e-3;
 
 /// What a rival that does nearly the same keeps beside the claim, however well the claim predicts: laws that simplify the same drive differ in what was left out of both.
@@ -114,7 +114,7 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
     Ok(Found { verdict, model, answers, notes: problem.notes.clone() })
 }
 
-/// Numbers of a fit as a file has them: seven digits.
+/// Parameters of a fit as a file has them: seven digits.
 fn rounded(candidate: &Candidate) -> Numbers {
     let mut numbers = candidate.fit.numbers;
     for n in &candidate.fit.free {
@@ -141,7 +141,7 @@ fn answer(index: usize, joint: &Joint, found: Searched) -> Answer {
     Answer { joint: index, found, judged, is_held_out }
 }
 
-/// Held-out recordings run again with all joints where their own free runs bring them, not where they were recorded.
+/// Re-simulation of held-out recordings with all joints where their own free runs bring them, not where they were recorded.
 fn from_commands_alone(problem: &Problem, mut answers: Vec<Answer>) -> Result<Vec<Answer>, ServoError> {
     let numbers = |of: &dyn Fn(&Searched) -> Numbers| -> Vec<Option<Numbers>> {
         (0..problem.joints.len()).map(|j| answers.iter().find(|a| a.joint == j).map(|a| of(&a.found))).collect()
@@ -298,7 +298,7 @@ pub(crate) fn numbers_of(candidate: &Candidate) -> BTreeMap<String, Estimate> {
     candidate.fit.free.iter().map(|n| (n.facts().key.to_string(), of_number(candidate, *n))).collect()
 }
 
-/// The proportional gain, where gravity with known masses tells it.
+/// The proportional gain, where gravity with known masses determines it.
 fn gain_of(joint: &Joint, found: &Searched) -> Option<Estimate> {
     let best = &found.best;
     if !joint.is_weighed || !best.added.contains(&"gravity") || best.added.contains(&"gain") || best.added.contains(&"payload") {
@@ -331,7 +331,7 @@ fn scale(problem: &Problem, answers: &[Answer]) -> String {
     }
 }
 
-/// Where a physics acts.
+/// Where an effect acts.
 pub fn place(joint: &str, physics: &str) -> Place {
     match physics {
         "dead_band" | "gain" | "saturation" | "speed_limit" | "acceleration_limit" | "integral" | "lead" => {

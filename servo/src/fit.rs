@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Substeps between two samples take at most so long, s.
 const SUBSTEP: f64 = 7e-3;
-/// Errors beyond so many scales count by their size, no more by its square: a loss of a few stretches does not rule a fit.
+/// Errors beyond this number of scales count by their size, no more by its square: a loss in a few segments does not dominate a fit.
 const BOUND: f64 = 2.0;
 
 /// What is fitted.
@@ -30,7 +30,7 @@ const LEFT_OUT: usize = 1;
 /// Stretches that a record is cut into, for comparisons.
 pub const BLOCKS: usize = 4;
 
-/// Numbers that fit.
+/// Fitted parameters.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Which are free.
@@ -88,7 +88,7 @@ impl<'a> Problem<'a> {
         self.residuals(numbers, None).into_iter().map(|r| r.into_iter().map(|x| x * self.scale).collect()).collect()
     }
 
-    /// Fits the free numbers from a start on, in at most so many steps; `without`: a fold that the fit does not see.
+    /// Fits the free parameters from a start on, in at most this number of steps; `without`: a fold that the fit does not see.
     pub fn fit(&self, free: &[Number], start: &Numbers, most: usize, without: Option<usize>) -> Fit {
         let mut numbers = *start;
         for n in free {
@@ -134,7 +134,7 @@ impl<'a> Problem<'a> {
         Fit { free: free.to_vec(), numbers, cost }
     }
 
-    /// Numbers of fits without each fold: one step from the fit to all with the derivatives there, halved until it is none for the worse.
+    /// Parameters of fits without each fold: one step from the fit to all with the derivatives there, halved until it is none for the worse.
     pub fn leave_out(&self, fit: &Fit) -> Vec<Numbers> {
         let residuals = self.residuals(&fit.numbers, None);
         let parts = self.parts(&fit.free, &fit.numbers, &residuals, None);

@@ -15,11 +15,11 @@ const LATEST: f64 = 1.0;
 pub enum Use {
     /// Its commands move it.
     Good,
-    /// It says nothing, for this reason.
+    /// It has no information, for this reason.
     Still(String),
 }
 
-/// Looks at a joint.
+/// Examines a joint.
 ///
 /// # Errors
 /// Where its command is none.
@@ -166,7 +166,7 @@ fn best_lag(record: &Record, signal: &[f64]) -> (f64, f64) {
         if (-0.1..=LATEST).contains(&time) && share > near.1 + 1e-9 {
             near = (time, share);
         }
-        // Every lag that a servo may have is looked at.
+        // Every lag that a servo may have is tried.
         let is_near = ((lag as f64) * step + 0.2).abs() < LATEST + 0.5;
         lag += if is_near { 1 } else { 1.max(most / 500) };
     }

@@ -1,17 +1,17 @@
-//! What may be missing at a servo joint: the numbers of each physics, where its fit starts, and what it is easily taken for.
+//! What may be missing at a servo joint: the parameters of each effect, where its fit starts, and what it is easily taken for.
 
 use backdrive_plant::servo::{Number, Numbers};
 
-/// A physics that may be added.
+/// An effect that may be added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Physics {
     /// Its name in a verdict.
     pub name: &'static str,
     /// In words.
     pub words: &'static str,
-    /// The numbers that it frees, its size first.
+    /// The parameters that it frees, its size first.
     pub numbers: &'static [Number],
-    /// Another physics that it needs.
+    /// Another effect that it needs.
     pub needs: &'static [&'static str],
     /// Those that do nearly the same.
     pub rivals: &'static [&'static str],
@@ -54,14 +54,14 @@ pub const ALL: [Physics; 14] = [
     physics("quadratic_drag", "drag that grows with the square of the speed", &[Number::QuadraticDamping], &[], &[]),
 ];
 
-/// A physics by its name.
+/// An effect by its name.
 pub fn named(name: &str) -> Option<&'static Physics> {
     ALL.iter().find(|p| p.name == name)
 }
 
 impl Physics {
-    /// Where a fit of it may start, from that of the structure before: `typical` is the usual size of command less position, rad, `fastest` the largest speed of the position,
-    /// rad/s, `quickest` its largest acceleration, rad/s².
+    /// Where a fit of it may start, from that of the structure before. `typical` is the usual size of command less position, rad; `fastest` is the largest
+    /// speed of the position, rad/s; `quickest` is its largest acceleration, rad/s².
     pub fn starts(&self, from: &Numbers, size: &Sizes) -> Vec<Numbers> {
         let with = |changes: &[(Number, f64)]| {
             let mut numbers = *from;

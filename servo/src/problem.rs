@@ -1,4 +1,4 @@
-//! A set of commands and positions with the model that they are held against.
+//! A set of commands and positions with the model that they are compared with.
 
 use crate::error::ServoError;
 use crate::gravity;
@@ -38,7 +38,7 @@ pub struct Joint {
     pub is_weighed: bool,
 }
 
-/// Whether a set holds commands of position servos, and no torque. `Ok(false)` also where its first file cannot be read, which is told there.
+/// Whether a set holds commands of position servos, and no torque. `Ok(false)` also where its first file cannot be read, which is reported there.
 pub fn is_servo(set: &RecordingSet) -> bool {
     if !set.joints.is_empty() {
         return set.joints.iter().any(|j| j.has_command) && set.joints.iter().all(|j| !j.has_torque);
@@ -77,7 +77,7 @@ fn pairs(plain: &[&str]) -> Vec<(String, String, String)> {
 }
 
 impl Problem {
-    /// Reads a set; `model`: in the place of the set's own.
+    /// Reads a set; `model` replaces the set's own.
     ///
     /// # Errors
     /// Where a file cannot be read, a column, topic or field is missing, or a unit is none of an angle or a length.
@@ -148,7 +148,7 @@ fn record_of(recording: &Recording, name: &str, joint: &JointColumns, model: &Mo
     })
 }
 
-/// Where each joint stands: as the set says, else by headings such as `NAME.command` and `NAME.position`.
+/// Where each joint stands: from the set, else by headings such as `NAME.command` and `NAME.position`.
 fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
     let file = set.folder.join("set.toml").display().to_string();
     if !set.joints.is_empty() {

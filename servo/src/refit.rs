@@ -1,4 +1,4 @@
-//! The numbers of a model's servo joints fitted again, their physics as they are.
+//! The parameters of a model's servo joints refitted, their effects unchanged.
 
 use crate::diagnose::{floor, numbers_of};
 use crate::error::ServoError;
@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Refitted {
     /// Its name.
     pub joint: String,
-    /// Its numbers by key, with their intervals.
+    /// Its parameters by key, with their intervals.
     pub numbers: BTreeMap<String, Estimate>,
     /// Median nrmse of free runs of the given numbers on held-out recordings, else on those that were fitted; `None` where the joint rests in all.
     pub given: Option<f64>,
@@ -34,11 +34,11 @@ pub struct Refitted {
 pub struct Fitted {
     /// Each joint that the model has a servo of and that moves.
     pub joints: Vec<Refitted>,
-    /// The model with their numbers.
+    /// The model with their parameters.
     pub model: Model,
 }
 
-/// Fits the numbers that a model states, all but those at which nothing happens.
+/// Fits the parameters that a model states, all but those at values without effect.
 ///
 /// # Errors
 /// Where a command is none, or no joint of the model was recorded.

@@ -1,4 +1,5 @@
-//! All joints of an arm in time, from their commands alone: what gravity does to one depends on where the others are, so they are run again where they came to be.
+//! All joints of an arm in time, from their commands alone. The effect of gravity on one depends on where the others are, so they are re-simulated where they
+//! came to be.
 
 use crate::error::ServoError;
 use crate::fit::substeps;

@@ -1,9 +1,9 @@
-//! What a diagnosis of servo joints says in words.
+//! A diagnosis of servo joints in words.
 
 use crate::physics::named;
 use backdrive_diagnosis::verdict::{Finding, ServoPart, Word};
 
-/// A physics in words.
+/// An effect in words.
 pub fn words(physics: &str) -> String {
     named(physics).map_or_else(|| backdrive_diagnosis::words::physics(physics), |p| p.words.to_string())
 }

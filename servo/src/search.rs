@@ -1,4 +1,4 @@
-//! Which physics a servo joint needs: one after another, each taken up only where it predicts what its fit has not seen better than without it.
+//! Which effects a servo joint needs: one after another, each added only where it predicts held-out data better than without it.
 
 use crate::fit::{BLOCKS, Fit, Problem};
 use crate::physics::{ALL, BASE, Physics, Sizes, named};
@@ -12,16 +12,16 @@ use std::collections::BTreeSet;
 /// Steps of a fit that only screens, and of one that counts.
 const SCREEN: usize = 4;
 const FULL: usize = 15;
-/// Physics of a round that are looked at on unseen recordings.
+/// Effects of a round that are evaluated on held-out recordings.
 const FINALISTS: usize = 3;
-/// A physics has to lower the mean loss on unseen recordings by this share.
+/// An effect has to lower the mean loss on held-out recordings by this share.
 const LEAST: f64 = 0.02;
 /// What shows in few recordings has to lower it by this share, and others may lose this share of what those gain.
 const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
-/// Errors up to so many times what the position sensor resolves are its own.
+/// Errors up to this many resolutions of the position sensor are the sensor's own.
 const NOISE: f64 = 1.4;
-/// Physics that are also tried two at a time: neither alone need show.
+/// Effects that are also tried two at a time: neither alone need show.
 const PAIRS: [[&str; 2]; 5] = [
     ["speed_limit", "acceleration_limit"],
     ["gravity", "load_friction"],
@@ -43,7 +43,7 @@ pub struct Candidate {
     pub unseen: Vec<[f64; BLOCKS]>,
 }
 
-/// A physics that was looked at on unseen recordings.
+/// An effect that was evaluated on held-out recordings.
 #[derive(Debug, Clone)]
 pub struct Tried {
     /// What was added.
@@ -52,7 +52,7 @@ pub struct Tried {
     pub drops: Option<&'static str>,
     /// Better than without it?
     pub gain: Option<Gain>,
-    /// By which share it lowers the mean loss on unseen recordings.
+    /// By which share it lowers the mean loss on held-out recordings.
     pub lowers: f64,
     /// Whether it was taken up.
     pub taken: bool,
@@ -73,7 +73,7 @@ pub struct Found {
     pub folds: Vec<usize>,
 }
 
-/// How sure one physics is.
+/// Confidence in one effect.
 #[derive(Debug, Clone)]
 pub struct Claim {
     /// Its name.
@@ -116,8 +116,8 @@ fn begin<'a>(records: &[&'a Record], floor: f64, without: &'a [String]) -> (Sear
     (searcher, base, best)
 }
 
-/// Looks at each joint again from what the others have: joints of one arm often have the same servos. What a joint takes over it has to predict its own unseen
-/// recordings with.
+/// Examines each joint again with the effects of the others: joints of one arm often have the same servos. An effect that a joint takes over has to predict
+/// its own held-out recordings.
 pub fn search_all(joints: &[(Vec<&Record>, f64)], without: &[String]) -> Vec<Found> {
     let mut all: Vec<(Searcher, Candidate, Candidate)> =
         joints.par_iter().map(|(records, floor)| begin(records, *floor, without)).collect();
@@ -178,7 +178,7 @@ struct Searcher<'a> {
     size: Sizes,
     floor: f64,
     tried: Vec<Tried>,
-    /// Physics that are not considered.
+    /// Effects that are not considered.
     excluded: &'a [String],
 }
 
@@ -206,7 +206,7 @@ impl Searcher<'_> {
         best
     }
 
-    /// The structure and the numbers of another joint, where they predict this one better; what is particular to a joint stays its own.
+    /// The structure and the parameters of another joint, where they predict this one better; what is particular to a joint stays its own.
     fn adopted(&mut self, best: &Candidate, other: &Candidate) -> Candidate {
         let mut added = best.added.clone();
         added.extend(other.added.iter().filter(|name| !best.added.contains(name)));
@@ -214,7 +214,7 @@ impl Searcher<'_> {
         for n in [Number::Offset, Number::Gain, Number::MomentCos, Number::MomentSin] {
             start[n] = best.fit.numbers[n];
         }
-        // Every physics that both have together, those it needs first.
+        // Every effect that both have together, those it needs first.
         let order = |name: &&str| ALL.iter().position(|p| p.name == *name);
         added.sort_by_key(order);
         let mut kept: Vec<&'static str> = Vec::new();
@@ -260,7 +260,8 @@ impl Searcher<'_> {
         !is_there && fulfilled && !is_early && !weightless && !self.excluded.iter().any(|name| name == physics.name)
     }
 
-    /// Whether one predicts unseen recordings better than another beyond chance: in most stretches, or by much in some recordings and by little worse in none.
+    /// Whether one predicts held-out recordings better than another beyond chance: in most segments, or by much in some recordings and by little worse in
+    /// none.
     fn is_better(&self, base: &Candidate, better: &Candidate) -> bool {
         let lowers = 1.0 - total(better) / total(base);
         // Below what the sensor resolves there is nothing to explain.
@@ -282,12 +283,12 @@ impl Searcher<'_> {
         is_no_worse && lowers > MUCH && losses < FEW * gains && rest > 0.2 * LEAST * total(base) * self.problem.records.len() as f64
     }
 
-    /// Whether one in the place of another lowers the mean loss on unseen recordings, and is no worse in most of them.
+    /// Whether one instead of another lowers the mean loss on held-out recordings, and is no worse in most of them.
     fn is_no_worse(&self, base: &Candidate, better: &Candidate) -> bool {
         total(better) < (1.0 - LEAST) * total(base) && self.gain(base, better).is_none_or(|g| g.mean > 0.0)
     }
 
-    /// What a round may do, in two stages: add a physics, or two that need each other; put one in the place of a rival.
+    /// What a round may do, in two stages: add an effect, or two that need each other; replace one by a rival.
     fn moves(&self, best: &Candidate, stage: usize) -> Vec<Move> {
         let singles = ALL.iter().filter(|p| self.may(p, &best.added)).map(|p| Move { adds: vec![p], drops: None });
         let pairs = PAIRS.iter().filter_map(|[a, b]| {
@@ -353,7 +354,7 @@ impl Searcher<'_> {
             let lowers = 1.0 - total(&candidate) / total(best);
             let names = change.adds.iter().map(|p| p.name).collect();
             self.tried.push(Tried { adds: names, drops: change.drops.map(|p| p.name), gain, lowers, taken: false });
-            // One in the place of another has to be better only; a second number of two has to be worth it as well.
+            // A replacement has to be better only; the second effect of a pair has to be worth it as well.
             let enough = match change.drops {
                 Some(_) => self.is_no_worse(best, &candidate),
                 None => self.is_better(best, &candidate) && lowers > LEAST * change.adds.len() as f64,
@@ -429,7 +430,7 @@ pub(crate) fn candidate_of(problem: &Problem, added: Vec<&'static str>, free: &[
     Candidate { added, fit, folds, unseen }
 }
 
-/// The numbers that a first look at a move fits: its own, and those that most often give way to it.
+/// The parameters that a first evaluation of a move fits: its own, and those that most often change with it.
 fn screened(change: &Move) -> Vec<Number> {
     let own = change.adds.iter().flat_map(|p| p.numbers.iter().copied());
     let all: BTreeSet<Number> = own.chain([Number::Damping, Number::Offset, Number::Inertia]).collect();
@@ -441,7 +442,7 @@ pub fn total(candidate: &Candidate) -> f64 {
     candidate.unseen.iter().flatten().sum::<f64>() / (candidate.unseen.len() * BLOCKS).max(1) as f64
 }
 
-/// The numbers that a structure frees.
+/// The parameters that a structure frees.
 pub fn free_of(added: &[&str]) -> Vec<Number> {
     let all: BTreeSet<Number> =
         BASE.iter().copied().chain(added.iter().filter_map(|n| named(n)).flat_map(|p| p.numbers.iter().copied())).collect();

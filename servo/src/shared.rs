@@ -1,10 +1,10 @@
-//! What the recordings of a servo joint do not tell apart, and the motion that would.
+//! What the recordings of a servo joint do not distinguish, and the motion that would.
 
 use crate::search::Found;
 use backdrive_diagnosis::verdict::SharedCause;
 use backdrive_plant::servo::Number;
 
-/// A rival this many standard errors behind is told apart.
+/// A rival this many standard errors behind is rejected.
 const APART: f64 = 2.5;
 
 /// Causes that share what was seen.
@@ -40,7 +40,7 @@ fn cause(causes: &[&str], sentence: &str, motion: &str) -> SharedCause {
     }
 }
 
-/// What two physics share, and what separates them.
+/// What two effects share, and what separates them.
 fn told(one: &str, other: &str) -> (&'static str, &'static str) {
     let is = |a: &str, b: &str| (one, other) == (a, b) || (one, other) == (b, a);
     if is("coulomb", "dead_band") {

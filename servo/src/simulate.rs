@@ -153,7 +153,7 @@ pub fn simulate(numbers: &Numbers, record: &Record, substeps: usize) -> Vec<f64>
                 (q, v) = (q + far, next);
                 continue;
             }
-            // It comes to rest within the substep: there it stays, or it turns for what is left.
+            // It comes to rest within the substep: there it stays, or it turns for the rest.
             let share = if v != 0.0 { v / (v - next) } else { 0.0 };
             let stopped = 0.5 * share * h * v;
             q += stopped;

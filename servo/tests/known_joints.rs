@@ -32,7 +32,7 @@ fn commands() -> Vec<Vec<f64>> {
     vec![at(&sines(1.0)), at(&sines(2.0)), at(&ramps), at(&steps), at(&sines(3.0)), at(&|t| 1.5 * ramps(t + 1.0))]
 }
 
-/// The joint as an encoder tells it; finer substeps than any fit takes.
+/// The joint as an encoder measures it; finer substeps than any fit takes.
 fn joint(numbers: &Numbers) -> Joint {
     let record = |(i, command): (usize, Vec<f64>)| {
         let t: Vec<f64> = (0..command.len()).map(|i| 0.02 * i as f64).collect();

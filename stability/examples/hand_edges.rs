@@ -1,5 +1,6 @@
-//! The stable gain on the contact script for hands that grip otherwise than the canceller's file says: nothing cancelled, the exact model with the grip
-//! of the file, and the canceller that estimates the hand, without and with the gain that the loop bears without a canceller (docs/canceller.md).
+//! The stable gain on the contact script for hands whose grip differs from the one in the canceller's file. Three cases are compared: no cancellation,
+//! the exact model with the grip of the file, and the canceller that estimates the hand. The last one runs without and with the gain that is stable
+//! without a canceller (docs/canceller.md).
 //!
 //!     cargo run --release -p backdrive-stability --example hand_edges [GRAPH [GRIP...]]
 

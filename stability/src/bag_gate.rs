@@ -12,7 +12,7 @@ use backdrive_bags::{Account, Fault, Reader};
 use backdrive_msgs::topic::Kind;
 use backdrive_nodes::graph::Graph;
 
-/// A bag looked at as a whole.
+/// The result of examining a whole bag.
 pub(crate) struct Gate {
     /// What keeps a green answer back, whatever its rows show; `None` where nothing does.
     pub(crate) kept_back: Option<Unjudged>,
@@ -25,7 +25,7 @@ pub(crate) struct Gate {
 /// More of a topic's messages than this must not be missing, as no more of the loop's steps may.
 const MOST_MISSING: f64 = 0.01;
 
-/// Looks at a bag: every message is counted, and what was recorded of each node is held against its graph.
+/// Examines a bag: every message is counted, and the record of each node is compared with its graph.
 pub(crate) fn gate(reader: &Reader, graph: &Graph) -> Result<Gate, SessionError> {
     let account = Account::of(reader)?;
     let Against { contradictions, parts, notes: of_nodes } = against(reader, graph)?;
@@ -73,15 +73,15 @@ fn lost(account: &Account, reader: &Reader) -> Option<Unjudged> {
     beyond.then(|| Unjudged::Lost { messages: account.lost() })
 }
 
-/// What in a recording keeps back the green answer of a loop that is run again from it: the same as `stability` says of the bag at its own gain. The notes
-/// say what it is in detail.
+/// What in a recording prevents the answer "stable" for a re-simulation of its loop: the same conditions as those of `stability` for the bag at its own
+/// gain. The notes say what it is in detail.
 ///
 /// # Errors
 /// The bag cannot be read.
 pub fn held_back(reader: &Reader, graph: &Graph, exchanged: bool) -> Result<(Option<Unjudged>, Vec<String>), SessionError> {
     let session = match Session::from_bag(reader, graph) {
         Ok(session) => session,
-        // Without a loop nothing is judged, and what is missing is missing all the same.
+        // Without a loop nothing is judged, and what is missing is missing nevertheless.
         Err(SessionError::Missing { .. }) => {
             let Gate { kept_back, notes, .. } = gate(reader, graph)?;
             return Ok((kept_back, notes));

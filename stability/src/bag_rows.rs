@@ -69,7 +69,7 @@ impl Place {
         self.places.get(entry.topic.index).copied().flatten()
     }
 
-    /// The message, if it is of a topic that is read or tells the gains.
+    /// The message, if its topic is read or reports the gains.
     pub(crate) fn message(&self, entry: &Entry) -> Result<Option<Message>, SessionError> {
         if self.heard(entry).is_none() && self.gains != Some(entry.topic.index) {
             return Ok(None);
@@ -250,7 +250,7 @@ fn lay(role: SignalRole, heard: &Heard, [axis, axes]: [usize; 2], first: u64, si
         SignalRole::Dither | SignalRole::Intent | SignalRole::Induced => {}
         // Of the scaling's force only the flags count, and the slave's motion comes with its contact force.
         SignalRole::Force | SignalRole::Slave => {}
-        // Of motors no bag of ours tells; a slave's servo is in its model.
+        // Our bags record nothing about motors; a slave's servo is in its model.
         SignalRole::SlaveForce | SignalRole::Hand | SignalRole::Sensor => {}
     }
     for (step, flags) in heard.steps.iter().zip(&heard.flags) {
@@ -269,7 +269,7 @@ fn lay(role: SignalRole, heard: &Heard, [axis, axes]: [usize; 2], first: u64, si
     }
 }
 
-/// An optional signal that says nothing on an axis is none.
+/// An optional signal without any value on an axis counts as absent.
 fn drop_silent(axis: &mut AxisSignals, notes: &mut Vec<String>) {
     let silent = |column: &Option<Vec<f64>>| column.as_ref().is_some_and(|c| c.iter().all(|x| x.is_nan()));
     if silent(&axis.intent) {
@@ -300,7 +300,7 @@ fn note_holes(topic: &str, role: SignalRole, heard: &Heard, rows: usize, notes: 
     }
 }
 
-/// The gains in force at each row: as told, and before the first that was told as the graph's plan says.
+/// The gains in force at each row: as reported, and before the first report as in the graph's plan.
 fn gain_rows(graph: &Graph, first: u64, rows: usize, told: &mut [(u64, f64, f64)], notes: &mut Vec<String>) -> (Vec<f64>, Vec<f64>) {
     told.sort_by_key(|t| t.0); // stable: of two at one step the later counts
     if told.is_empty() {

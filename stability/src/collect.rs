@@ -11,7 +11,7 @@ use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 /// What a topic carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
-    /// x_u, what the hand wants.
+    /// x_u, the hand's intended motion.
     Intent,
     /// x_m and F_f: the master's measured position, and the force applied to it.
     Master,
@@ -51,7 +51,7 @@ pub struct Collector {
     axes: Vec<Columns>,
     /// Flags of the master's and the slave's samples, together.
     flags: Vec<u32>,
-    /// (row, mu, lambda) as told.
+    /// (row, mu, lambda) as reported.
     gains: Vec<(usize, f64, f64)>,
     /// The first step heard is row 0.
     origin: Option<u64>,
@@ -166,7 +166,7 @@ impl Collector {
         }
     }
 
-    /// Room for so many rows.
+    /// Room for this number of rows.
     pub fn reserve(&mut self, rows: usize) {
         self.flags.reserve(rows);
         for columns in &mut self.axes {
@@ -244,8 +244,8 @@ impl Collector {
 
     /// What a verdict is drawn from, per axis. A row whose message is missing keeps the value before it.
     ///
-    /// On several axes the hand holds still when it does so on all of them, for one moves the others: the intent is then
-    /// the way that the hand has come, summed over its axes.
+    /// On several axes the hand holds still when it does so on all of them, because one moves the others. The intent is then the path length of the
+    /// hand, summed over its axes.
     pub fn traces(&self) -> Vec<Trace> {
         let rows = self.rows();
         let clamped: Vec<bool> = self.flags.iter().take(rows).map(|f| f & flag::LIMITED != 0).collect();
@@ -273,7 +273,7 @@ impl Collector {
     /// Which rows lack a fresh sample of a signal of the loop.
     fn gaps(&self, columns: &Columns) -> Gaps {
         let heard = |signal: Signal| self.topics.iter().any(|(_, s)| *s == signal);
-        // What an operator that pushes by a force wants is no position.
+        // The intent of an operator that pushes by a force is no position.
         let silent = |column: &Vec<f64>| !column.is_empty() && column.iter().all(|x| x.is_nan());
         let intent = (heard(Signal::Intent) && !silent(&columns.intent)).then_some(&columns.intent);
         let command = (!columns.command.is_empty()).then_some(&columns.command);
@@ -300,12 +300,12 @@ impl Collector {
         }
     }
 
-    /// The verdict on what went by: the worst of the axes. `None` where there is no loop and nothing shakes.
+    /// The verdict on what was collected: the worst of the axes. `None` where there is no loop and nothing oscillates.
     pub fn outcome(&self) -> Option<Outcome> {
         let judged = || Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
         match self.no_loop() {
             None => Some(judged()),
-            // A slave that shakes by itself shakes whether its force comes back or not.
+            // A slave that oscillates by itself does so whether its force comes back or not.
             Some(_) if self.has != HasLoop::No => Some(judged()).filter(Outcome::is_unstable),
             Some(_) => None,
         }
@@ -345,7 +345,7 @@ impl Collector {
         Session { axes: axes.collect(), mu, lambda, ..self.blank.clone() }
     }
 
-    /// mu*lambda as it was last told.
+    /// mu*lambda as last reported.
     pub fn last_loop_gain(&self) -> f64 {
         self.gains.last().map_or(f64::NAN, |(_, mu, lambda)| mu * lambda)
     }

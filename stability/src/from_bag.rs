@@ -1,4 +1,4 @@
-//! A session from a bag of ours: the graph in the bag tells which topic is which signal.
+//! A session from a bag of ours: the graph in the bag assigns topics to signals.
 
 use crate::bag_gate::{Gate, gate};
 use crate::bag_rows::{Place, Rows};
@@ -15,9 +15,9 @@ impl Session {
     ///
     /// Rows are steps, from the first that any signal has to the last. What a topic lacks is NaN and counted in the notes.
     ///
-    /// A bag of more than [`MOST_ROWS`] steps (of one axis; of several as many fewer) is read in pieces of so many, one after the other, so that
-    /// memory does not grow with its length. What the recording did is told of all of them ([`Session::elsewhere`]); the rows are those of
-    /// the piece that did worst, of equals the first.
+    /// A bag of more than [`MOST_ROWS`] steps (of one axis; of several correspondingly fewer) is read in pieces of that size, one after the other, so
+    /// that memory does not grow with its length. What the recording did is judged over all of them ([`Session::elsewhere`]). The rows are those of
+    /// the worst piece; of equals the first.
     ///
     /// # Errors
     /// A damaged bag; x_m, F_f, x_c or F_s missing; steps that make no rows.

@@ -2,7 +2,7 @@
 
 use backdrive_plant::model::Hold;
 
-/// A signal as it was recorded.
+/// A recorded signal.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Series {
     /// Header stamps, ns; of messages without one, or with none filled in, the log time.
@@ -180,7 +180,7 @@ impl Ordered {
 pub(crate) fn step_of(values: &[f64]) -> f64 {
     let changes: Vec<f64> = values.windows(2).map(|v| (v[1] - v[0]).abs()).filter(|d| *d > 0.0 && d.is_finite()).collect();
     let size = values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
-    // What is left of a subtraction is no step.
+    // The rounding error of a subtraction is no step.
     let real = || changes.iter().copied().filter(|d| *d > 1e-12 * size);
     let smallest = real().fold(f64::INFINITY, f64::min);
     let count = real().count();

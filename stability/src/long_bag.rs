@@ -55,7 +55,7 @@ pub(crate) fn read(reader: &Reader, graph: &Graph, place: &Place, most: u64) -> 
     let mut kept = Rows::of(place);
     for entry in reader.messages()? {
         let entry = entry?;
-        // Without decoding it: of what else there is, a bag of ours says the step beside.
+        // Without decoding it: a bag of ours states the step beside every other fact.
         if entry.facts.is_some_and(|facts| !pieces.of(facts.step).contains(&chosen)) {
             continue;
         }
@@ -109,7 +109,7 @@ impl Pieces {
         self.next = number + 1;
         rows.gains = self.gains.clone();
         let outcome = match rows.session(reader, graph, place) {
-            // Whether the end of the recording is there is told of the whole.
+            // Whether the end of the recording is there is judged for the whole.
             Ok(session) => recorded_outcome(&Session { cut_short: None, ..session }).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty }),
             // A signal of the loop is silent for all of the piece.
             Err(_) => Outcome::NotJudged { why: Unjudged::Gaps { steps: self.most as usize, of: self.most as usize } },

@@ -38,7 +38,7 @@ pub(crate) struct Wanted {
 /// Substeps for a linear model whose energy is counted: it would be stepped by one whole period otherwise.
 const LINEAR_SUBSTEPS: usize = 8;
 
-/// Runs the graph's master under the recorded intent, its sensors ideal; a force or intent that is not measured stays as it was.
+/// Runs the graph's master under the recorded intent, its sensors ideal; a force or intent that is not measured stays unchanged.
 ///
 /// # Errors
 /// One sentence: no model, no intent though the model has a hand, a model that cannot be compiled.

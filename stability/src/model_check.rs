@@ -1,9 +1,8 @@
 //! Do the models in the graph do what the recording shows? Each device is run alone, open loop, on what it was given in
 //! the recording, and what it puts out is compared with what was recorded.
 //!
-//! Open loop, because a closed loop that is stable hides what its parts do wrong, and one that is not multiplies it. A
-//! device that does something else than its model is the first sign of missing physics; which device it is, is the first
-//! step of finding it.
+//! Open loop, because a closed loop that is stable hides what its parts do wrong, and one that is not multiplies it. A device that differs from its
+//! model is the first sign of missing effects; which device it is, is the first step of finding it.
 
 use crate::part_check::{AGREES_WITHIN, PartCheck};
 use crate::session::Session;
@@ -52,7 +51,7 @@ pub fn check(graph: &Graph, session: &Session) -> Result<Vec<PartCheck>, BuildEr
         let way = graph.connections.iter().find(|c| c.to.0 == place && c.to.1 == "command");
         let unsteady = way.and_then(|c| c.impairment).is_some_and(|i| i.jitter_s > 0.0 || i.loss > 0.0);
         let late = way.map_or(0, |c| c.delay + c.impairment.map_or(0, |i| (i.delay_s / session.period_s).round() as u64)) as usize;
-        // What a controller's force does is not told from the command alone.
+        // A controller's force is not determined by the command alone.
         if way.is_some() && !unsteady {
             let command: Vec<Vec<f64>> = session.axes.iter().map(|a| delayed(&a.command, late)).collect();
             let command: Vec<&[f64]> = command.iter().map(Vec::as_slice).collect();
@@ -74,7 +73,7 @@ pub fn check(graph: &Graph, session: &Session) -> Result<Vec<PartCheck>, BuildEr
     Ok(checks)
 }
 
-/// Whether the reflected force is lambda times the contact force, as late as the graph says.
+/// Whether the reflected force is lambda times the contact force, with the delay of the graph.
 fn force_path(graph: &Graph, session: &Session) -> Vec<PartCheck> {
     let Some(scaling) = graph.nodes.iter().position(|n| n.kind == NodeKind::Scaling) else { return Vec::new() };
     let way = |to: &str| graph.connections.iter().find(|c| c.to.1 == to && (c.to.0 == scaling || c.from.0 == scaling));
@@ -94,7 +93,7 @@ fn force_path(graph: &Graph, session: &Session) -> Vec<PartCheck> {
         let nothing = vec![0.0; predicted.len()];
         let counts = |row: usize| {
             let clamped = axis.clamped.get(row).copied().unwrap_or(false);
-            // Gains are told now and then, so that a ramp is not known exactly.
+            // Gains are reported only now and then, so a ramp is not known exactly.
             let ramps = session.lambda.get(row) != session.lambda.get(row.saturating_sub(1000));
             felt.get(row).is_some_and(|f| *f != 0.0) && !clamped && !ramps && predicted[row].is_finite()
         };

@@ -1,5 +1,5 @@
-//! What a run did: stable, a limit cycle, unstable, limited, or nothing that can be judged; and the signals of one axis, from which
-//! [`crate::judgement::judge`] says which.
+//! What a run did: stable, a limit cycle, unstable, limited, or nothing that can be judged. Also the signals of one axis, from which
+//! [`crate::judgement::judge`] decides which.
 
 use crate::unjudged::{Gaps, Unjudged};
 use backdrive_plant::model::Motion;
@@ -15,7 +15,7 @@ pub enum Unit {
     /// rad: the axis turns.
     #[serde(rename = "rad")]
     Radian,
-    /// m or rad: whoever recorded it does not say.
+    /// m or rad: the recording does not state which.
     #[serde(rename = "m or rad")]
     Unknown,
 }
@@ -70,13 +70,13 @@ pub enum Closes {
 pub struct Trace {
     /// Time of one step, s.
     pub period_s: f64,
-    /// What the hand wanted, m or rad; empty where nobody recorded it.
+    /// The hand's intended motion, m or rad; empty where it was not recorded.
     pub intent: Vec<f64>,
     /// The master's measured position, m or rad.
     pub position: Vec<f64>,
     /// Force of the environment on the slave, N or N m.
     pub contact: Vec<f64>,
-    /// The slave's position, m or rad; empty where nobody recorded it.
+    /// The slave's position, m or rad; empty where it was not recorded.
     pub slave: Vec<f64>,
     /// Position scale, master to slave.
     pub mu: f64,
@@ -158,18 +158,18 @@ impl Outcome {
         matches!(self, Outcome::LimitCycle { .. } | Outcome::Unstable { .. })
     }
 
-    /// The same, but not judged in the place of stable where something keeps a green answer back. What speaks against the loop stands.
+    /// The same, but not judged instead of stable where something prevents the answer "stable". What speaks against the loop stands.
     pub fn held_back(self, by: Option<Unjudged>) -> Outcome {
         match (self, by) {
             (Outcome::Stable, Some(why)) => Outcome::NotJudged { why },
-            // That something is lost says more than that nothing was touched in what is left.
+            // A loss is more informative than that nothing was touched in the rest.
             (Outcome::NotJudged { why: before }, Some(why)) if !before.is_loss() && why.is_loss() => Outcome::NotJudged { why },
             (outcome, _) => outcome,
         }
     }
 
-    /// How bad it is, for several axes: the worst counts. An axis that touched nothing says nothing of one that did, but one of which
-    /// something is missing takes a green answer from all.
+    /// How bad it is, for several axes: the worst counts. An axis that touched nothing is no evidence on one that did, but one with missing data
+    /// prevents the answer "stable" for all.
     pub(crate) fn rank(&self) -> u8 {
         match self {
             // Of several that say nothing, the one that came farther.
@@ -212,5 +212,5 @@ pub(crate) const LEAST_AMPLITUDE: f64 = 2e-6;
 /// Half the span of thousands of samples of noise stays below this, standard deviations.
 pub(crate) const NOISE: f64 = 5.0;
 
-/// Slower than this the hand moves too: where nobody recorded what it wants, only what is faster is the loop's, Hz.
+/// Slower than this the hand moves too: where its intent was not recorded, only faster motion is the loop's, Hz.
 pub(crate) const LOWEST_HZ: f64 = 8.0;

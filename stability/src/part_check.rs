@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How well a device's model tells what was recorded of the device.
+/// How well a device's model predicts the recorded signals of the device.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartCheck {
     /// In contact: `master`, `slave`, or `force path`: the way from F_s to the reflected part of F_f, with its gain and delay. All along the recording:
@@ -24,7 +24,7 @@ pub struct PartCheck {
     /// Times between which the device does not do what its model does, s from the begin of the recording; `None` where it is all of what was compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub span_s: Option<[f64; 2]>,
-    /// Whether the model tells the device: the error is within three floors, or below [`AGREES_WITHIN`] of the effect.
+    /// Whether the model predicts the device: the error is within three times the noise floor, or below [`AGREES_WITHIN`] of the effect.
     pub agrees: bool,
 }
 

@@ -3,7 +3,7 @@
 use crate::session::AxisSignals;
 use std::ops::Range;
 
-/// A slave that lets go for less than this stays in contact, s.
+/// A slave that leaves contact for less than this stays in contact, s.
 const BRIDGE_S: f64 = 0.05;
 /// The first part of a hold is the transient of getting there, s.
 const TRANSIENT_S: f64 = 0.15;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// The MCAP files of a recording in the order in which they were written.
 ///
 /// # Errors
-/// Nothing there; a storage or a compression that is not read: the error says how to convert it.
+/// Nothing there; a storage or a compression that is not read: the error explains how to convert it.
 pub(crate) fn mcap_files(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let storage = |what: String| SessionError::Storage { path: path.to_owned(), what };
     if path.is_dir() {

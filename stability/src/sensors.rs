@@ -1,12 +1,12 @@
 //! Signals that say nothing: dead, at their rail, clipped, or not moving with the sensor that measures the same.
 //!
-//! Nothing here knows a model, so it serves for any recording, and for columns that nobody asked for. What it goes by:
+//! Nothing here knows a model, so it serves for any recording, and for columns that were not requested. Its criteria:
 //!
 //! | fault | rule | reason |
 //! |---|---|---|
 //! | constant | every sample is the same | whatever it measures, its noise would show |
 //! | within its resolution | three values at most, all within a thousandth of the largest | a converter flickers by one step to either side of a value that does not move; a signal that switches has values far apart |
-//! | clipped | it stops dead at one and the same extreme value, three times at least, for a hundredth of the time | a signal that turns round slows down first, and takes an extreme value once; one that a converter clips comes at full speed and stays |
+//! | clipped | it stops dead at one and the same extreme value, three times at least, for a hundredth of the time | a signal that reverses slows down first, and takes an extreme value once. A signal that a converter clips arrives at full speed and stays |
 //! | does not follow | it explains less than a tenth of what the other sensor of the same quantity moves | two sensors of one quantity are in proportion |
 
 use crate::grid::step_of;
@@ -20,9 +20,9 @@ pub struct Column<'a> {
     pub name: String,
     /// Its samples, in any unit; NaN where there is none.
     pub values: &'a [f64],
-    /// Whether it is a position: then it may come to rest at a stop, and nothing is said of its extremes.
+    /// Whether it is a position: then it may come to rest at a stop, and its extremes are not judged.
     pub position: bool,
-    /// The signal that it measures too, sample by sample; `None` where there is none or nobody says.
+    /// The signal that it measures too, sample by sample; `None` where there is none or none is stated.
     pub twin: Option<Twin<'a>>,
 }
 
@@ -45,7 +45,7 @@ pub struct SensorFault {
     pub fault: Fault,
 }
 
-/// Ways in which a signal says nothing, or not always.
+/// Faults of a signal that is without information always or at times.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "fault", rename_all = "snake_case")]
 pub enum Fault {
@@ -78,7 +78,7 @@ pub enum Fault {
 }
 
 impl SensorFault {
-    /// Whether the signal says nothing at all.
+    /// Whether the signal has no information at all.
     pub fn is_dead(&self) -> bool {
         !matches!(self.fault, Fault::Clipped { .. } | Fault::DoesNotFollow { .. })
     }
@@ -104,7 +104,7 @@ impl std::fmt::Display for SensorFault {
     }
 }
 
-/// A converter that flickers takes so many values at most.
+/// A converter that flickers takes at most this number of values.
 const FLICKER_VALUES: usize = 3;
 /// And these lie within this share of the largest.
 const FLICKER_SHARE: f64 = 1e-3;
@@ -112,7 +112,7 @@ const FLICKER_SHARE: f64 = 1e-3;
 const LEAST_CLIPPED: f64 = 0.01;
 /// And comes there at least so often.
 const LEAST_ARRIVALS: usize = 3;
-/// And stays for at least so many samples each time.
+/// And stays for at least this number of samples each time.
 const LEAST_STAY: usize = 3;
 /// Two sensors of the same quantity share at least so much of their variance.
 const LEAST_EXPLAINED: f64 = 0.1;
@@ -164,7 +164,7 @@ fn clipped(values: &[f64], at: f64) -> Option<(f64, f64)> {
     if share < LEAST_CLIPPED {
         return None;
     }
-    // As fast as it is elsewhere, and by more than the rounding of a slow signal.
+    // As fast as in other places, and by more than the rounding of a slow signal.
     let moves: Vec<f64> = values.windows(2).filter_map(|w| Some((w.first()? - w.get(1)?).abs())).filter(|d| *d > 1.01 * step).collect();
     let typical = rms(&moves);
     let (mut arrivals, mut row) = (0, 0);

@@ -24,7 +24,7 @@ pub enum SessionError {
         signal: &'static str,
         /// Why.
         why: String,
-        /// What cannot be told without it.
+        /// What cannot be determined without it.
         without: &'static str,
     },
     /// The messages make no rows.
@@ -45,7 +45,7 @@ pub enum SessionError {
     },
 }
 
-/// The signals of a session: what they are, and what cannot be told without them.
+/// The signals of a session: what they are, and what cannot be determined without them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SignalRole {
     Master,
@@ -80,7 +80,7 @@ impl SignalRole {
         }
     }
 
-    /// What cannot be told where it is missing.
+    /// What cannot be determined where it is missing.
     pub(crate) fn without(self) -> &'static str {
         match self {
             SignalRole::Master => "neither the induced motion nor the loop can be told, nor whether the master oscillates",

@@ -17,7 +17,7 @@ pub struct Averaging {
     pub overlap: f64,
     /// How many segments.
     pub segments: usize,
-    /// As many independent segments would tell as much.
+    /// The equivalent number of independent segments.
     pub averages: f64,
     /// From line to line, Hz.
     pub resolution_hz: f64,

@@ -1,8 +1,8 @@
 //! Transparency: what the hand feels of what the slave touches, and how well each follows the other.
 //!
-//! The transmitted impedance Z_t = -S_{r,F_f-d} / (jw S_{r,x_m}) is held against mu lambda Z_e, Z_e = -S_{r,F_s} / (jw S_{r,x_s}), with
-//! r an exogenous signal, the dither d or else the operator's intent: correlating with r keeps what the loop feeds back out of both.
-//! Their distance is Lawrence's (1993): the mean of |ln |Z_t / (mu lambda Z_e)|| over the band in which all four correlate with r.
+//! The transmitted impedance Z_t = -S_{r,F_f-d} / (jw S_{r,x_m}) is compared with mu lambda Z_e, Z_e = -S_{r,F_s} / (jw S_{r,x_s}). Here r is an
+//! exogenous signal, the dither d or else the operator's intent: correlating with r removes what the loop feeds back from both. Their distance is
+//! Lawrence's (1993): the mean of |ln |Z_t / (mu lambda Z_e)|| over the band in which all four correlate with r.
 
 use crate::master_run::{Wanted, run_master};
 use crate::phases::{contacts, holds};
@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Transparency of one axis. What cannot be told is `None`, and the notes say why.
+/// Transparency of one axis. Values that cannot be determined are `None`, and the notes give the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Transparency {
     /// Name of the axis.
@@ -28,7 +28,7 @@ pub struct Transparency {
     pub position_contact_rms: Option<f64>,
     /// RMS of F_f - d - lambda F_s in contact, N.
     pub force_contact_rms: Option<f64>,
-    /// RMS of lambda F_s in contact, N: what the former is to be held against.
+    /// RMS of lambda F_s in contact, N: the reference of the former.
     pub reflected_rms: Option<f64>,
     /// rms_of_finite(x_mf) / rms_of_finite(x_mu) in contact: what the reflected force does to the master over what the hand does, by the master's model.
     pub induced_ratio: Option<f64>,
@@ -66,7 +66,7 @@ pub struct Impedance {
 pub struct Cancellation {
     /// Time of the first contact, s.
     pub contact_s: f64,
-    /// Time from there that was looked at, s.
+    /// Time from there that was evaluated, s.
     pub window_s: f64,
     /// 1 - rms_of_finite(x_mf - x^_mf) / rms_of_finite(x_mf): 1 is perfect, 0 as good as none, below 0 worse.
     pub quality: f64,
@@ -80,7 +80,7 @@ const WINDOW_S: f64 = 0.05;
 const LEAST_COHERENCE: f64 = 0.8;
 /// Segments that a coherence needs to mean something.
 const LEAST_SEGMENTS: usize = 6;
-/// A frequency at which the exogenous signal has less than this share of its peak power tells nothing.
+/// A frequency at which the exogenous signal has less than this share of its peak power is not used.
 const LEAST_POWER: f64 = 1e-6;
 
 /// Transparency of every axis. `graph` is the one that made the session, where it is ours: the induced motion comes from its master.
@@ -205,7 +205,7 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
     let pieces = whole_pieces(&pieces, &columns, &gains().collect::<Vec<f64>>());
     let longest = pieces.iter().map(|p| p.end - p.start).max().unwrap_or(0);
     let most = ((1.0 / period_s) as usize).max(16);
-    // As long as possible up to 1 s, but enough of them to tell what coheres.
+    // As long as possible up to 1 s, but enough of them to estimate the coherence.
     let count = |length: usize| pieces.iter().map(|p| (p.end - p.start).saturating_sub(length / 2) / (length / 2).max(1)).sum::<usize>();
     let mut length = longest.min(most);
     while length >= 16 && count(length) < LEAST_SEGMENTS * 2 {

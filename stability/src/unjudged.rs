@@ -22,21 +22,21 @@ pub enum Unjudged {
     Gaps {
         /// Steps without a fresh sample of every signal of the loop.
         steps: usize,
-        /// Of so many.
+        /// Of this number.
         of: usize,
     },
     /// It ends before the graph's `duration_s`.
     CutShort {
         /// Steps that are there.
         steps: usize,
-        /// Of so many.
+        /// Of this number.
         of: usize,
     },
     /// The bag was never closed, and its graph has no duration: how much is missing behind its end is not known.
     NotClosed,
     /// A node died or failed while it ran.
     NodeDied,
-    /// The recording says two things that exclude each other, or what its graph does not make of it.
+    /// The recording contradicts itself, or differs from what its graph computes.
     Contradictory,
     /// The models in the bag do not do what was recorded.
     ModelsApart,
@@ -80,8 +80,8 @@ impl Unjudged {
         }
     }
 
-    /// Whether something is missing that there should be: then what is left may look stable and prove nothing. Without contact or a hold
-    /// nothing is missing, but nothing was shown either.
+    /// Whether something is missing that there should be: then the rest may look stable and prove nothing. Without contact or a hold nothing is
+    /// missing, but nothing was shown either.
     pub fn is_loss(&self) -> bool {
         !matches!(self, Unjudged::NoFeedback | Unjudged::NoContact | Unjudged::NoHold | Unjudged::NotShaken | Unjudged::NoDecay)
     }
@@ -119,7 +119,7 @@ pub struct Gaps {
     /// Longest gap that the loop bridges by holding its last force, s: the graph's `stale_after_s`. Beyond it the nodes let the force go, so
     /// that it is another loop.
     pub bridged_s: f64,
-    /// Rows that there should be; 0 where nobody says.
+    /// Rows that there should be; 0 where this is not stated.
     pub planned: usize,
 }
 

@@ -138,7 +138,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// The play and the friction of each direction that are known to be there, fitted in the place of what was named.
+/// The play and the friction of each direction that are known to be there, fitted instead of the named effects.
 fn rival(report: &mut Report, context: &Context, dead_zone: f64) -> Result<(), StudyError> {
     let ask = Ask { name: "play", set: "set.toml", model: "play.toml", without: &[], effects: 1, effort: 0.85 };
     let found = refit(context, &ask)?;

@@ -24,7 +24,7 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Vec<Vec<f64>>, StudyError> {
     Ok(columns)
 }
 
-/// As [`read`], of a file that has at least so many rows.
+/// As [`read`], of a file that has at least this number of rows.
 ///
 /// # Errors
 /// As [`read`], and where it has fewer.

@@ -3,7 +3,7 @@
 use crate::{Study, StudyError};
 use std::path::{Path, PathBuf};
 
-/// Environment variable that says where the recordings are.
+/// Environment variable with the folder of the recordings.
 pub const VARIABLE: &str = "BACKDRIVE_DATA";
 /// Where they are looked for without it, from the root of the project.
 const BESIDE: &str = "../shared/data";
@@ -17,7 +17,7 @@ pub struct Data {
 }
 
 impl Data {
-    /// Where the environment variable says, else where the caller says, else beside the project.
+    /// In the folder of the environment variable, else the caller's folder, else beside the project.
     pub fn find(given: Option<&Path>) -> Data {
         let named = std::env::var_os(VARIABLE).filter(|v| !v.is_empty()).map(PathBuf::from);
         Data::of(named, given)

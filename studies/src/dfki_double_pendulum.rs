@@ -1,5 +1,5 @@
-//! A two-joint arm under gravity, joint by joint: the rigid arm's torque is computed here from the published model and handed over as a known load, and
-//! the diagnosis says what the joint has besides.
+//! A two-joint arm under gravity, joint by joint. The rigid arm's torque is computed here from the published model and handed over as a known load, and
+//! the diagnosis reports what the joint has besides.
 //!
 //! The library's models are chains of one axis whose inertia does not depend on where they stand, so a joint cannot have the arm in its model.
 
@@ -22,7 +22,7 @@ pub(crate) const STUDY: Study = Study {
 const PUBLISHED: &str = "published_model_1.0.yml";
 /// The long record, of which either half is a recording.
 const LONG: &str = "061157";
-/// The short ones, whose torque is a command (it has no noise, and in two of them it is 0 for the second half): they are looked at afterwards.
+/// The short ones, whose torque is a command (it has no noise, and in two of them it is 0 for the second half): they are evaluated afterwards.
 const SHORT: [&str; 4] = ["060143", "060245", "055640", "055032"];
 /// Rate of the even grid, Hz; corner of the zero-phase filter on every column, Hz; every so manieth sample is kept; samples left out at either end.
 const RATE: f64 = 1000.0;
@@ -44,7 +44,7 @@ const DRY: [(&str, &str); 8] = [
     ("preisach_lugre", "coulomb"),
 ];
 
-/// Numbers of the published model: masses, lengths, inertias about the joints, centres of mass, friction.
+/// Parameters of the published model: masses, lengths, inertias about the joints, centres of mass, friction.
 struct Arm {
     inertia: [f64; 2],
     mass: [f64; 2],

@@ -51,7 +51,7 @@ impl From<Failure> for StudyError {
     }
 }
 
-/// A step of a study that failed with what it says.
+/// A failed step of a study with its error.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError::Diagnosis(error.to_string())
 }

@@ -25,7 +25,7 @@ const RATE: f64 = 250.0;
 const CORNER: f64 = 12.0;
 /// See [`RATE`].
 const KEPT: usize = 2;
-/// Physics that would be flexibility of the joint.
+/// Effects that would be flexibility of the joint.
 const FLEXIBLE: [&str; 7] = ["series_compliance", "cubic_spring", "hysteretic_spring", "bouc_wen", "backlash", "contact", "hunt_crossley"];
 
 fn run(context: &Context) -> Result<Report, StudyError> {
@@ -87,7 +87,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// Normalised error of each output over the runs that no fit has seen.
+/// Normalised error of each output over the held-out runs.
 fn unseen(found: &Diagnosis, structure: &Structure, values: &[f64]) -> Result<Vec<(String, f64)>, StudyError> {
     let records = &found.problem.held_out;
     let failed = || StudyError::Diagnosis("the model cannot be simulated on the unseen runs".to_string());

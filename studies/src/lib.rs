@@ -1,7 +1,7 @@
-//! Studies: recordings of real devices, diagnosed by the code of `backdrive diagnose` and held against what was published of them.
+//! Studies: recordings of real devices, diagnosed by the code of `backdrive diagnose` and compared with the published results.
 //!
-//! A study is a folder of `studies/` (model files, sets, a README with its table) and a file here with a line in [`STUDIES`]. The recordings
-//! are not part of the project: [`data::Data`] says where they are looked for.
+//! A study is a folder of `studies/` (model files, sets, a README with its table) and a file here with a line in [`STUDIES`]. The recordings are not
+//! part of the project: [`data::Data`] knows where they are searched.
 
 pub mod csv_columns;
 pub mod data;

@@ -42,7 +42,7 @@ fn factor(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x| (0.1..=100.0).contains(x)).ok_or_else(|| "a number from 0.1 to 100".to_string())
 }
 
-/// What the exit code says.
+/// The meaning of the exit code.
 const CODES: &str = "Exit code: 0 every bar of the tables is met, 1 a bar is missed, 2 usage, 3 a file is missing, broken or of another kind, or there is \
                      no such study, 5 this machine does not let it, 7 none of the recordings are here.";
 
@@ -55,7 +55,7 @@ fn main() -> ExitCode {
         let lines: Vec<String> = STUDIES.iter().map(|study| format!("{:<22} {}", study.name, study.about)).collect();
         return output::line(lines.join("\n")).map_or_else(|failure| output::fail(&failure), |()| ExitCode::SUCCESS);
     }
-    // A name that is wrong is told before the first study takes its minutes.
+    // A wrong name is reported before the first study takes its minutes.
     let asked: Result<Vec<&Study>, StudyError> =
         if options.all { Ok(STUDIES.to_vec()) } else { options.names.iter().map(|name| study_named(name)).collect() };
     match asked {

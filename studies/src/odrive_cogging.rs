@@ -19,7 +19,7 @@ const COUNTS: f64 = 8192.0;
 const TORQUE: f64 = 15.0 * 2.5e-4 / 0.4;
 /// What the rotor does before this time brings it to its start, s.
 const START: f64 = 1.0;
-/// Which run of which file becomes which recording: all without compensation, and with the other motor as it was for the map.
+/// Which run of which file becomes which recording: all without compensation, and with the other motor in the same state as for the map.
 const RUNS: [(&str, f64, &str); 4] = [
     ("slow2.csv", 3.0, "slow-3.csv"),
     ("slow2.csv", 4.0, "slow-4.csv"),

@@ -14,9 +14,9 @@ pub(crate) const STUDY: Study = Study {
 
 /// Sample time, s.
 const PERIOD: f64 = 0.005;
-/// Physics whose force depends on the path and not on the time.
+/// Effects whose force depends on the path and not on the time.
 const HYSTERESIS: [&str; 5] = ["bouc_wen", "hysteretic_spring", "maxwell_slip", "dahl", "preisach_lugre"];
-/// Physics that let the displacement lag behind the drive.
+/// Effects that let the displacement lag behind the drive.
 const LAG: [&str; 3] = ["delay", "bandwidth", "damper"];
 
 fn run(context: &Context) -> Result<Report, StudyError> {

@@ -1,4 +1,4 @@
-//! A diagnosis as `backdrive diagnose` makes it, from a set whose recordings lie elsewhere.
+//! A diagnosis like that of `backdrive diagnose`, from a set whose recordings lie in another folder.
 
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
@@ -26,16 +26,16 @@ pub struct Ask<'a> {
     pub set: &'a str,
     /// The nominal model, a file in the study's folder.
     pub model: &'a str,
-    /// Physics that are withheld.
+    /// Effects that are withheld.
     pub without: &'a [&'a str],
-    /// How many physics may be missing at once, at most.
+    /// How many effects may be missing at once, at most.
     pub effects: usize,
     /// How much the search may compute, as a multiple of what it does by default.
     pub effort: f64,
 }
 
-/// Diagnoses a set of the study: verdict.json, report.html, model.diagnosed.toml, the nominal model and a set.toml that `backdrive diagnose`
-/// takes as it is go into the folder of results.
+/// Diagnoses a set of the study. The folder of results gets verdict.json, report.html, model.diagnosed.toml, the nominal model and a set.toml that
+/// `backdrive diagnose` takes without change.
 ///
 /// # Errors
 /// When a file cannot be read or written, or the diagnosis fails.
@@ -68,17 +68,17 @@ fn placed(context: &Context, ask: &Ask) -> Result<(PathBuf, PathBuf), StudyError
     Ok((out, set))
 }
 
-/// What the audit of a verdict says of the recordings of a set; nothing is fitted.
+/// The audit's remarks on the recordings of a set; nothing is fitted.
 ///
 /// # Errors
-/// When a file cannot be read or written, or the set and the model do not go together.
+/// When a file cannot be read or written, or the set and the model do not match.
 pub fn remarks(context: &Context, ask: &Ask) -> Result<Vec<Remark>, StudyError> {
     let (_, set) = placed(context, ask)?;
     let problem = Problem::open(&set, None).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
     Ok(audit(&problem))
 }
 
-/// The nominal model refitted, its structure as it is, as `backdrive fit` does: no physics is considered.
+/// The nominal model refitted, its structure unchanged, as `backdrive fit` does: no effect is considered.
 ///
 /// # Errors
 /// As [`diagnose`].
@@ -135,12 +135,12 @@ fn resolve(text: &str, folders: &[&Path]) -> Result<String, String> {
     Ok(document.to_string())
 }
 
-/// Names of the physics of a verdict's findings, most important first, each with its place.
+/// Names of the effects of a verdict's findings, most important first, each with its place.
 pub fn findings(verdict: &Verdict) -> Vec<(String, String)> {
     verdict.findings.iter().map(|finding| (finding.physics.clone(), finding.place.to_string())).collect()
 }
 
-/// What a verdict says, in one line: its word and the physics it names.
+/// A verdict in one line: its word and the effects it names.
 pub fn said(verdict: &Verdict) -> String {
     let named: Vec<String> = findings(verdict).into_iter().map(|(physics, place)| format!("{physics} at {place}")).collect();
     let word = verdict.word.spoken();
@@ -150,7 +150,7 @@ pub fn said(verdict: &Verdict) -> String {
 /// Confidence above which an alternative is worth a line.
 pub const LIKELY: f64 = 0.05;
 
-/// What could be instead of each finding, as the verdict says, with a confidence above this.
+/// Alternatives to each finding of the verdict, with a confidence above this.
 pub fn instead(verdict: &Verdict, least: f64) -> Vec<String> {
     let mut all = Vec::new();
     for finding in &verdict.findings {

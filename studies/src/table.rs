@@ -1,4 +1,4 @@
-//! What a study says: measured beside published, and whether it is where it should be.
+//! The result of a study: measured beside published, and whether it is in its range.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ pub struct Report {
     pub notes: Vec<String>,
     /// Figures by name, for tests: no rounding.
     pub figures: Vec<(String, f64)>,
-    /// What was found by name, for tests: verdicts and the physics that they name.
+    /// What was found by name, for tests: verdicts and the effects that they name.
     pub words: Vec<(String, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! The command: what it says and exits with where the input is wrong or the recordings are not here.
+//! The command: its output and exit code where the input is wrong or the recordings are not here.
 
 use std::path::Path;
 use std::process::{Command, Output};

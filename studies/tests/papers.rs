@@ -12,7 +12,7 @@ fn long() -> bool {
     std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
 }
 
-/// A study's report; `None` with a message where nobody asks for its minute.
+/// A study's report; `None` with a message where its minute was not requested.
 fn report(name: &str) -> Option<Report> {
     if !long() && std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
         skipped("searches of a minute; BACKDRIVE_LONG=1 runs them");

@@ -1,4 +1,4 @@
-//! Records of a real teleoperator as sessions: judged at their own gains, their dead sensor told, the law that couples their motors recovered.
+//! Records of a real teleoperator as sessions: judged at their own gains, their dead sensor reported, the law that couples their motors recovered.
 //! Where the recordings are not, a message and nothing else.
 
 #[path = "../../tests/common/skipped.rs"]

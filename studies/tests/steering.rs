@@ -47,7 +47,7 @@ fn the_rig_gives_the_simulated_admittance() {
     assert_eq!(recorded.force.len(), recorded.demand.len());
 }
 
-/// Two numbers of one oil are found from a few points, by either reading of the cost.
+/// Two parameters of one oil are found from a few points, by either reading of the cost.
 #[test]
 fn a_fit_ends_where_the_data_were_made() {
     let bench = Bench::load().unwrap();

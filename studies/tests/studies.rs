@@ -19,7 +19,7 @@ fn long() -> bool {
     std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
 }
 
-/// The report of a study whose short part takes half a minute; `None` with a message where nobody asks for it, or as [`report`].
+/// The report of a study whose short part takes half a minute; `None` with a message where it was not requested, or as [`report`].
 fn report_of_a_search(name: &str) -> Option<Report> {
     if !long() && std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
         skipped("a search of half a minute; BACKDRIVE_LONG=1 runs it");
@@ -104,7 +104,7 @@ fn emps_from_its_published_models() {
         assert!(has("delay") && has("friction_deficit"), "{from}: {found}");
         let mass = report.figure_named(&format!("{from} mass"));
         assert!((mass / 95.1089 - 1.0).abs() < 0.01, "{from}: {mass}");
-        // Better than the best published form on the record that no fit has seen.
+        // Better than the best published form on the held-out record.
         assert!(report.figure_named(&format!("{from} error")) < 4.5, "{from}: {}", report.figure_named(&format!("{from} error")));
     }
 }
@@ -147,13 +147,13 @@ fn the_motor_cogs_seven_times_a_turn() {
 #[test]
 fn the_damper_s_joint_is_slack_about_its_middle() {
     let Some(report) = report_of_a_search("brfd_friction_damper") else { return };
-    // What is named stands in the joint, and holds for strokes and speeds that no fit has seen.
+    // What is named stands in the joint, and holds for held-out strokes and speeds.
     let verdict = report.word_named("verdict");
     assert!(["backlash at rod-drum", "cubic_spring at rod-drum"].iter().any(|p| verdict.contains(p)), "{verdict}");
     let [before, after] = ["held out before", "held out after"].map(|name| report.figure_named(name));
     assert!(after < 0.7 * before, "{after} {before}");
-    // The play that is known to be there, fitted in its place: its gap lies between the lines that its round edges go over to, and is wider than
-    // the dead zone of 4.3 mm that is read off.
+    // The play that is known to be there, fitted in its place. Its gap lies between the asymptotes of its round ends, and is wider than the dead zone
+    // of 4.3 mm that is read off.
     assert!((4.0e-3..7.0e-3).contains(&report.figure_named("rival gap")), "{}", report.figure_named("rival gap"));
     let [forward, backward] = ["forward", "backward"].map(|side| report.figure_named(&format!("rival {side}")));
     assert!((8e3..11e3).contains(&forward) && (9e3..12e3).contains(&backward), "{forward} {backward}");

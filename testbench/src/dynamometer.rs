@@ -13,9 +13,9 @@ pub fn torque_of(model: &DynamometerModel, record: &Record) -> Vec<f64> {
     record.command.iter().zip(&record.dyno_speed).map(|(wanted, speed)| machine.step(*wanted, *speed).0).collect()
 }
 
-/// The linear system of second order behind a static map whose simulated torque is nearest to the converter's estimate: for every delay of whole
-/// periods up to 20 ms natural frequency, damping ratio and the map's last slope are fitted, the best delay is kept. Stationary points hardly
-/// reach the dragging side of the map, where this record is shaken; so its slope is fitted here.
+/// The linear system of second order behind a static map whose simulated torque is nearest to the converter's estimate. For every delay of whole
+/// periods up to 20 ms, natural frequency, damping ratio and the map's last slope are fitted; the best delay is kept. Stationary points hardly reach
+/// the dragging side of the map, where this record is excited; so its slope is fitted here.
 ///
 /// # Errors
 /// When no fit converges: the record does not excite the machine.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 /// Numbers and how well they are known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {
-    /// The numbers.
+    /// The parameters.
     pub values: Vec<f64>,
     /// Their standard errors from the residuals taken as white.
     pub deviations: Vec<f64>,
@@ -15,7 +15,7 @@ pub struct Fitted {
 
 /// Numbers above 0 that make the residuals small, from a start above 0; they are moved by their logarithm.
 ///
-/// `None` where the start has no finite residuals, or they do not depend on the numbers.
+/// `None` where the start has no finite residuals, or they do not depend on the parameters.
 pub fn positive(start: &[f64], steps: usize, residuals: impl Fn(&[f64]) -> Vec<f64>) -> Option<Fitted> {
     let of = |logs: &DVector<f64>| DVector::from_vec(residuals(logs.map(f64::exp).as_slice()));
     let mut logs = DVector::from_iterator(start.len(), start.iter().map(|v| v.ln()));

@@ -46,7 +46,7 @@ pub struct Identified {
     pub observed: Vec<f64>,
 }
 
-/// Identifies a bench from three records: dragged and shaken; stationary points; steps of the pedal.
+/// Identifies a bench from three records: dragged with excitation; stationary points; steps of the pedal.
 ///
 /// # Errors
 /// When a record does not show what a step needs; the error names the step and what to record.

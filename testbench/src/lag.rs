@@ -5,7 +5,7 @@ use crate::record::{BenchError, Record};
 use backdrive_control::engine::{Engine, Grid};
 use backdrive_control::observer::{Design, Shaft, System, UnknownInput, Weights, design};
 
-/// Every so many steps the lag's error is looked at.
+/// Number of steps after which the lag's error is checked.
 const EVERY: usize = 20;
 
 /// How an observer is asked for.

@@ -1,9 +1,8 @@
 //! An engine test bench identified from its bags, as Blumenschein et al. (ECC 2013) do it.
 //!
-//! [`Record`] is what a bag of a bench holds. [`identify`] makes a [`Bench`] of three of them, in the paper's order: static maps, the
-//! dynamometer's linear part, J_A, the damping by matching poles, inertia and shaft refined in closed loop, then the engine's torque by the
-//! observer and the engine's lag from it. A [`Bench`] simulates itself; [`validate`] gives
-//! the correlations that the paper validates with.
+//! [`Record`] is what a bag of a bench holds. [`identify`] makes a [`Bench`] of three of them, in the paper's order: static maps, the dynamometer's
+//! linear part, J_A, and the damping by matching poles. Then inertia and shaft are refined in closed loop, and the observer gives the engine's torque
+//! and from it the engine's lag. A [`Bench`] simulates itself; [`validate`] gives the correlations that the paper validates with.
 
 mod dynamometer;
 mod fit;

@@ -34,8 +34,8 @@ pub fn inertia_of_dynamometer(record: &Record) -> Result<f64, BenchError> {
     }
 }
 
-/// The response of the engine's speed to the dynamometer's torque, (Hz, complex rad/s per N m): what is common with the added torque, which is
-/// nobody's noise, so that the speed control does not bias it. Hann windows of four seconds, half of each shared.
+/// The response of the engine's speed to the dynamometer's torque, (Hz, complex rad/s per N m). It uses what is common with the added torque, which
+/// is independent of all noise, so that the speed control does not bias it. Hann windows of four seconds, half of each shared.
 pub fn response(record: &Record, from_hz: f64, to_hz: f64) -> Vec<(f64, Complex<f64>)> {
     let length = (4.0 / record.period_s).round() as usize;
     if record.len() < length {
@@ -63,7 +63,7 @@ pub fn response(record: &Record, from_hz: f64, to_hz: f64) -> Vec<(f64, Complex<
     let step = 1.0 / (length as f64 * record.period_s);
     let most = sums.iter().map(|s| s.1.norm()).fold(0.0, f64::max);
     let lines = sums.iter().enumerate().map(|(line, sum)| (line as f64 * step, sum));
-    // A line without excitation says nothing.
+    // A line without excitation is not used.
     lines.filter(|(hz, sum)| (from_hz..=to_hz).contains(hz) && sum.1.norm() > 1e-6 * most).map(|(hz, sum)| (hz, sum.0 / sum.1)).collect()
 }
 
@@ -81,7 +81,7 @@ pub fn damping_by_poles(record: &Record, engine: f64, dynamometer: f64) -> Resul
     if lines.len() < 8 {
         return Err(poor());
     }
-    // In units of about one: frequencies over 200 rad/s. The torque that a sample tells acts half a period later on average.
+    // In units of about one: frequencies over 200 rad/s. The torque of a sample acts half a period later on average.
     let unit = 200.0;
     let mut poles = [0.0, 1.0];
     for _ in 0..30 {

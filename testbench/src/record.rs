@@ -59,7 +59,7 @@ pub struct Record {
     pub dyno_speed: Vec<f64>,
     /// Measured torque in the shaft, N m.
     pub shaft_torque: Vec<f64>,
-    /// What the simulated engine gave, ripple included, N m: the truth, which no identification looks at.
+    /// What the simulated engine gave, ripple included, N m: the truth, which no identification uses.
     pub true_engine_torque: Vec<f64>,
     /// The observer's estimate of it that was recorded, N m; empty without an observer.
     pub observed: Vec<f64>,

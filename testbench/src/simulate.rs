@@ -46,7 +46,7 @@ impl Stepper {
     }
 }
 
-/// The shaft under torques that are given, from the record's first speeds: it integrates, so what they are wrong by adds up.
+/// The shaft under torques that are given, from the record's first speeds: it integrates, so errors of the torques add up.
 pub fn open_loop(shaft: &Shaft, record: &Record, engine: &[f64], dynamometer: &[f64]) -> Trajectory {
     let mut stepper = Stepper::new(shaft, record.period_s, [record.engine_speed[0], record.dyno_speed[0]]);
     let mut found = Trajectory { engine_torque: engine.to_vec(), dyno_torque: dynamometer.to_vec(), ..Trajectory::default() };

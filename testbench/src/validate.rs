@@ -17,7 +17,7 @@ pub struct Validation {
     pub observer: [f64; 2],
     /// T_C of the engine model with the observed one.
     pub engine: f64,
-    /// T_A of the dynamometer model, dragged and shaken, and on the test cycle.
+    /// T_A of the dynamometer model, dragged with excitation, and on the test cycle.
     pub dynamometer: [f64; 2],
     /// w_C and T_A of the whole bench from pedal and wanted speed alone.
     pub whole: [f64; 2],

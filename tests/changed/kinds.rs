@@ -13,7 +13,7 @@ pub enum Costs {
     Others,
     /// Numbers are wrong: nothing may be judged by them.
     Numbers,
-    /// What it says of itself is wrong and matters.
+    /// Its own records are wrong, and it matters.
     Itself,
     /// Nothing: every answer stays.
     Nothing,

@@ -102,7 +102,7 @@ impl Bag {
         &mut self.metadata.iter_mut().find(|m| m.name == name).unwrap().metadata
     }
 
-    /// Takes out the record of its recorder.
+    /// Removes the record of its recorder.
     pub fn forget_completeness(&mut self) {
         self.metadata.retain(|m| m.name != "backdrive.completeness");
     }
@@ -139,7 +139,7 @@ impl Bag {
         self.messages.iter().filter(|m| m.topic == topic).count()
     }
 
-    /// Keeps the messages of which `keep` says so: topic, place on its topic, of how many.
+    /// Keeps the messages that `keep` accepts: topic, place on its topic, of how many.
     pub fn keep(&mut self, keep: impl Fn(&str, usize, usize) -> bool) {
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         self.messages.iter().for_each(|m| *counts.entry(m.topic.clone()).or_default() += 1);
@@ -151,7 +151,7 @@ impl Bag {
         });
     }
 
-    /// Topics of samples on which something is said.
+    /// Topics of samples with messages.
     pub fn samples(&self) -> Vec<String> {
         let mut topics: Vec<String> = Vec::new();
         for message in self.messages.iter().filter(|m| m.topic.ends_with("_js") || m.topic.ends_with("_jp") || m.topic.ends_with("_jf")) {

@@ -134,7 +134,7 @@ pub fn edge(mut low: f64, mut high: f64, tolerance: f64, mut grows: impl FnMut(f
     (low * high).sqrt()
 }
 
-/// Response of a device of the graph, held or loaded as the graph says, from its feedback to `output` at one frequency.
+/// Response of a device of the graph, held or loaded as in the graph, from its feedback to `output` at one frequency.
 pub fn response(graph: &Graph, kind: NodeKind, hz: f64) -> nalgebra::Complex<f64> {
     let node = graph.node_of(kind).unwrap();
     let (Settings::Master(files) | Settings::Slave(files)) = &node.settings else { unreachable!() };

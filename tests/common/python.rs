@@ -5,7 +5,7 @@ pub mod skipped;
 
 use std::path::PathBuf;
 
-/// The interpreter to use, or `None` to skip; `needs` tells what it must have, such as `that has tests/python/requirements.txt`.
+/// The interpreter to use, or `None` to skip; `needs` describes what it must have, such as `that has tests/python/requirements.txt`.
 pub fn python(needs: &str) -> Option<PathBuf> {
     if let Some(python) = std::env::var_os("BACKDRIVE_PYTHON") {
         return Some(python.into());

@@ -1,8 +1,8 @@
-//! A test that cannot run here says so where it is seen: `tests/run` names a file, and shows what is in it at its end.
+//! A test that cannot run here reports this where it is seen: `tests/run` names a file, and shows its content at its end.
 
 use std::io::Write;
 
-/// Says that the test of this thread is skipped, and why.
+/// Reports that the test of this thread is skipped, and why.
 pub fn skipped(why: impl std::fmt::Display) {
     let test = std::thread::current().name().unwrap_or("a test").to_string();
     eprintln!("skipped: {why}");

@@ -204,7 +204,7 @@ pub fn until(what: &str, mut so: impl FnMut() -> bool) {
     }
 }
 
-/// Waits until a bag that is being written holds so many messages of a topic.
+/// Waits until a bag that is being written holds this number of messages of a topic.
 pub fn until_recorded(bag: &Path, topic: &str, messages: u64) {
     until(&format!("{messages} messages of {topic}"), || {
         Reader::open(bag).is_ok_and(|r| r.topics().iter().zip(r.counts()).any(|(t, count)| t.name == topic && *count >= messages))

@@ -24,7 +24,7 @@ use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// The loop is run again for so many steps of a bag at most: many runs have to fit into half a minute.
+/// The re-simulation covers at most this number of steps of a bag: many runs have to fit into half a minute.
 const MOST_STEPS: usize = 60_000;
 
 /// A bag of ours.
@@ -43,7 +43,7 @@ pub struct Question<'a> {
     pub patience: Duration,
 }
 
-/// How long a diagnosis takes where nobody says otherwise: a bag is to be answered within half a minute.
+/// How long a diagnosis takes by default: a bag is to be answered within half a minute.
 pub const PATIENCE: Duration = Duration::from_secs(14);
 
 /// Why there is no answer.
@@ -52,7 +52,7 @@ pub enum WhyError {
     /// A node cannot be run by itself.
     #[error(transparent)]
     Alone(#[from] AloneError),
-    /// The loop cannot be run again.
+    /// The loop cannot be re-simulated.
     #[error(transparent)]
     Loop(#[from] ResimulateError),
 }
@@ -74,31 +74,31 @@ pub struct Answer {
     pub beneath: Option<Happening>,
     /// What would stop it, the best first.
     pub remedies: Vec<Remedy>,
-    /// Where the recording is not what the graph says.
+    /// Where the recording differs from the graph.
     pub differences: Vec<Difference>,
     /// The same in words.
     pub differs: Vec<String>,
-    /// What the loop as it was does when it is run again.
+    /// What the recorded loop does in its re-simulation.
     pub again: Option<String>,
     /// Its signals.
     #[serde(skip)]
     pub again_signals: Option<Session>,
     /// Whether that is what was recorded.
     pub reproduced: bool,
-    /// The master as it was, with what holds it, where it is not what the graph says: a model file.
+    /// The master as found, with what holds it, where it differs from the graph: a model file.
     #[serde(skip)]
     pub master: Option<String>,
-    /// The critical mu*lambda of the loop as it was; `None` where there is none within a factor of 20.
+    /// The critical mu*lambda of the recorded loop; `None` where there is none within a factor of 20.
     pub edge: Option<f64>,
-    /// Why the loop was not run again, where it was not.
+    /// Why the loop was not re-simulated, where it was not.
     pub not_again: Option<String>,
-    /// What nodes told while it ran, kinds with their counts.
+    /// Events that nodes reported while it ran, kinds with their counts.
     pub events: Vec<(String, usize)>,
     /// What a reader has to know.
     pub notes: Vec<String>,
 }
 
-/// Answers. `hear` is told what is being done.
+/// Answers. `hear` receives what is being done.
 ///
 /// # Errors
 /// A node that cannot be built; `cancel` was set.
@@ -106,7 +106,8 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let Question { session, graph, gain, .. } = question;
     let recorded = &bounded(question);
     let happening = Happening::of(session, recorded.rows);
-    // What contradicts itself is no record of this loop: where, is known, and a search of physics in it or the loop run again says nothing.
+    // A recording that contradicts itself is no record of this loop: the place is known, and neither a search of effects in it nor a re-simulation
+    // gives information.
     let contradictory = happening == Happening::NotJudged { why: Unjudged::Contradictory };
     let is_lossy = matches!(happening, Happening::NotJudged { why } if why.is_loss());
     let patience = if is_lossy { Duration::ZERO } else { question.patience };
@@ -140,7 +141,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
         Err(e) => answer.not_again = Some(e.to_string()),
     }
-    // What shakes and does not when it is run again has a difference that is small beside its signal.
+    // A loop that oscillates in the recording but not in its re-simulation has a difference that is small beside its signal.
     if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
         closer(question, recorded, &mut answer, hear, cancel)?;
     }
@@ -148,7 +149,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let named = Named::of(&was.graph, graph, answer.master.is_none());
     answer.remedies.iter_mut().for_each(|remedy| remedy.options = options(&remedy.changes, &named));
     of_events(&mut answer, recorded);
-    // Nothing shakes in what was recorded, and the graph that it is a recording of is that of another loop.
+    // Nothing oscillates in the recording, and the graph that it is a recording of is that of another loop.
     if let (Happening::Nothing, Some(why)) = (answer.happening, models_apart(graph, session)) {
         answer.happening = Happening::NotJudged { why };
         answer.happens = answer.happening.to_string();
@@ -174,7 +175,7 @@ fn bounded(question: &Question) -> Recorded {
     question.recorded.clone().bounded(&master.unwrap_or_default(), if bounds > 0.0 { bounds } else { f64::INFINITY })
 }
 
-/// A master that is so many times as far away as the hand ever wanted has run away.
+/// A master that is this many times as far away as the hand ever intended has run away.
 const BEYOND_THE_HAND: f64 = 10.0;
 
 /// Looks again, for differences that are ten times as small; they are kept where the loop then does what was recorded.
@@ -206,7 +207,7 @@ fn closer(
     Ok(())
 }
 
-/// Runs the loop again: as it was, without each suspect, with each remedy.
+/// Re-simulates the loop: as found, without each suspect, with each remedy.
 fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {
     let Question { session, graph, gain, .. } = question;
     if gain.product() == 0.0 {
@@ -253,7 +254,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         shakes_again,
     };
     answer.causes = causes(&asked, cancel)?;
-    // Of a loop that does not shake when it is run again nothing says what stops the one that did.
+    // If the loop does not oscillate in its re-simulation, nothing shows what would stop the recorded oscillation.
     if !shakes_again {
         return Ok(());
     }
@@ -273,7 +274,7 @@ fn counted(events: &[Told]) -> Vec<(String, usize)> {
     all
 }
 
-/// Causes that the nodes themselves told of: they are known without running anything again.
+/// Causes that the nodes themselves reported: they are known without any re-simulation.
 fn of_events(answer: &mut Answer, recorded: &Recorded) {
     let cause = |kind: CauseKind, place: String, evidence: String| Cause {
         kind,
@@ -305,7 +306,7 @@ fn of_events(answer: &mut Answer, recorded: &Recorded) {
         answer.differs.extend(told.into_iter().map(|c| c.evidence));
         return;
     }
-    // What was told weighs as much as everything that was inferred.
+    // A reported cause weighs as much as everything that was inferred.
     let share = 0.8;
     answer.causes.iter_mut().for_each(|c| c.confidence *= 1.0 - share);
     let each = share / told.len() as f64;

@@ -1,4 +1,4 @@
-//! The loop as it was: the graph of a bag with what was found to be otherwise.
+//! The recorded loop: the graph of a bag with the differences that were found.
 
 use crate::difference::{Difference, delay};
 use crate::faulty::Distortion;

@@ -1,8 +1,8 @@
 //! What makes a loop shake: causes with their evidence, and how sure each is.
 //!
-//! Two kinds of evidence count. A *difference* is where the recording is not what the graph says: it was seen. An *aspect* of the graph itself
-//! (a delay that it states, a grip that its canceller takes for another) was not seen to be wrong, but without it the loop would hold. For
-//! both the test is the same: the loop is run again as it was, and once more without that one thing.
+//! Two kinds of evidence count. A *difference* is where the recording differs from the graph: it was seen. An *aspect* of the graph itself (a delay
+//! that it states, a grip that its canceller takes for another) was not seen to be wrong, but without it the loop would hold. For both the test is
+//! the same: a re-simulation of the recorded loop, and one more without that one thing.
 
 use crate::as_it_was::{as_it_was, is_modelled};
 use crate::cause_kind::CauseKind;
@@ -47,7 +47,7 @@ pub struct Cause {
 pub struct Asked<'a> {
     /// The graph in the bag.
     pub graph: &'a Graph,
-    /// The loop as it was.
+    /// The recorded loop.
     pub was: &'a Trial,
     /// What differs.
     pub differences: &'a [Difference],
@@ -57,26 +57,26 @@ pub struct Asked<'a> {
     pub gain: Gain,
     /// What happened.
     pub happening: &'a Happening,
-    /// The critical mu*lambda of the loop as it was; `None` where none was found.
+    /// The critical mu*lambda of the recorded loop; `None` where none was found.
     pub edge: Option<f64>,
-    /// Whether the loop as it was does what was recorded.
+    /// Whether the re-simulated loop does what was recorded.
     pub reproduced: bool,
-    /// Whether the loop as it was shakes at all when it is run again. Where it does not, nothing can be learned from leaving a thing out of it.
+    /// Whether the recorded loop oscillates at all in its re-simulation. Where it does not, nothing can be learned from leaving a thing out of it.
     pub shakes_again: bool,
     /// Changes that every run has besides: motors without limits, where a limit hides what happens beneath.
     pub always: &'a [Change],
 }
 
-/// A difference that was seen weighs so many times as much as what the graph states.
+/// A difference that was seen weighs this many times as much as an aspect of the graph.
 const SEEN: f64 = 6.0;
 
-/// How much further the edge lies without a thing counts up to this factor.
+/// The increase of the stability limit without a thing counts up to this factor.
 const FURTHER: f64 = 4.0;
 
 /// Weight of a thing without which the loop does as before.
 const NO_EVIDENCE: f64 = 0.05;
 
-/// A thing that takes along this share of the amplitude explains the shaking, though what is left of it goes on.
+/// A thing whose removal removes this share of the amplitude explains the oscillation, even if the rest of it goes on.
 const MOST_OF_IT: f64 = 0.5;
 
 /// Weight of the gain where something else explains the shaking.
@@ -97,7 +97,7 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
             let edge = if run.outcome.is_stable() { suspect.without.edge(asked.hand, gain, cancel)?.critical_gain } else { None };
             let holds = run.outcome.is_stable();
             let further = match holds {
-                // What is stable with and without a thing says nothing of it.
+                // A loop that is stable with and without a thing gives no evidence on it.
                 _ if !asked.shakes_again => NO_EVIDENCE,
                 true => edge.map_or(FURTHER, |e| (e / gain).clamp(1.0, FURTHER)),
                 false => taken_along(asked.happening, &run.outcome).filter(|share| *share >= MOST_OF_IT).unwrap_or(NO_EVIDENCE),
@@ -120,7 +120,7 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
     Ok(weighed(asked, judged.into_iter().chain(unknown(asked)).collect()))
 }
 
-/// Share of the amplitude that goes with a thing; `None` where the one or the other is no limit cycle.
+/// Share of the amplitude that a thing causes; `None` where the one or the other is no limit cycle.
 fn taken_along(happening: &Happening, without: &Outcome) -> Option<f64> {
     match (happening, without) {
         (Happening::LimitCycle { amplitude_m: was, .. }, Outcome::LimitCycle { amplitude_m: left, .. }) => Some(1.0 - left / was),
@@ -128,7 +128,7 @@ fn taken_along(happening: &Happening, without: &Outcome) -> Option<f64> {
     }
 }
 
-/// Nodes that do something else than the graph says, of which no model is known, where the loop without them does not do what was recorded; each node once.
+/// Nodes that differ from the graph without a known model, where the loop without them does not do what was recorded; each node once.
 fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
     if asked.reproduced {
         return Vec::new();
@@ -159,7 +159,7 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
     all
 }
 
-/// Shares of the weights, with the gain itself as what is left where nothing else explains it.
+/// Shares of the weights, with the gain itself as the rest where nothing else explains it.
 fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
     if !asked.happening.is_trouble() {
         return Vec::new();
@@ -215,7 +215,7 @@ fn suspects(asked: &Asked) -> Vec<Suspect> {
     all
 }
 
-/// Whether the loop as it was does what was recorded: the same word, and, where both oscillate, the same frequency.
+/// Whether the re-simulated loop does what was recorded: the same word, and, where both oscillate, the same frequency.
 pub fn reproduces(happening: &Happening, again: &Outcome, again_hz: Option<f64>) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() <= 0.15 * a.max(b) + 1.0;
     match (happening, again) {

@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CauseKind {
-    /// mu*lambda is beyond what this device, as it is, allows.
+    /// mu*lambda is beyond what the real device allows.
     GainTooHigh,
     /// The way is long, or the rate low.
     Delay,
@@ -14,7 +14,7 @@ pub enum CauseKind {
     Loss,
     /// The hand grips otherwise than the canceller assumes.
     Grip,
-    /// The canceller takes out more at rest than the force puts in.
+    /// The canceller subtracts more at rest than the force puts in.
     OverCancelling,
     /// A mass that the canceller does not know.
     Inertia,
@@ -26,7 +26,7 @@ pub enum CauseKind {
     Backlash,
     /// Hysteresis that was left out.
     Hysteresis,
-    /// Other physics, or other numbers, than the canceller's model has.
+    /// Other effects, or other parameters, than the canceller's model has.
     OtherPhysics,
     /// A filter's lag.
     FilterLag,
@@ -48,7 +48,7 @@ pub enum CauseKind {
     Clock,
     /// Two nodes that speak on one topic.
     TwoPublishers,
-    /// A node does something else than its graph says, and none of these.
+    /// A node differs from its graph, by none of these causes.
     Unknown,
 }
 

@@ -49,7 +49,7 @@ pub enum Change {
         /// Hz; 0 for none.
         hz: f64,
     },
-    /// A way has only the delay that the graph says.
+    /// A way has only the delay in the graph.
     WayRepaired {
         /// Node at its end.
         node: String,
@@ -61,16 +61,16 @@ pub enum Change {
         /// Factor.
         factor: f64,
     },
-    /// A sensor does what its model says.
+    /// A sensor behaves like its model.
     SensorRepaired {
         /// The node that reads it.
         node: String,
     },
     /// Sensors that neither round nor are noisy.
     FinerSensors,
-    /// Dry friction between the master's bodies and ground made up for by the motor, as far as it is known.
+    /// The motor compensates dry friction between the master's bodies and ground, where it is known.
     FrictionCompensated {
-        /// Share of the friction that is made up for, 0 to 1.
+        /// Share of the friction that is compensated, 0 to 1.
         share: f64,
     },
     /// Damping at the handle, played by the motor.
@@ -243,7 +243,7 @@ fn masters(graph: &mut Graph) -> impl Iterator<Item = &mut Model> {
     })
 }
 
-/// Dry friction of a body against ground: what a motor can make up for.
+/// Dry friction of a body against ground: a motor can compensate it.
 pub(crate) fn is_friction_to_ground(element: &Element) -> bool {
     let is_friction = physics_named(element.law.kind().name).is_some_and(|physics| physics.family == Family::Friction);
     is_friction && element.between.contains(&None)

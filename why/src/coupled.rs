@@ -2,8 +2,8 @@
 
 use backdrive_nodes::graph::{Connection, Files, Graph, NodeKind, Overrides, Settings};
 
-/// Lets `law` couple the master and the slave of a graph, in the place of scaling and canceller. What delays and impairs the ways in this graph lies on the
-/// link then. A graph that cannot be read again, or has no scaling, stays as it is.
+/// Lets `law` couple the master and the slave of a graph, instead of scaling and canceller. What delays and impairs the ways in this graph lies on the link
+/// then. A graph that cannot be read again, or has no scaling, stays unchanged.
 pub fn couple(graph: &mut Graph, law: &str) {
     let changes = Overrides { coupling: Some(law.to_string()), ..Overrides::default() };
     let Ok(mut coupled) = Graph::from_text(&graph.text, &graph.path, &changes, &Files::Bag(&graph.files)) else { return };

@@ -16,7 +16,7 @@ use std::time::Duration;
 /// Of what a diagnosis computes by default: a bag is to be answered within half a minute, and there is one record.
 const EFFORT: f64 = 0.2;
 
-/// Rows that are looked at, up to this time after the first touch, s: what shakes then shows all it can show within it.
+/// Rows that are evaluated, up to this time after the first touch, s: an oscillation is fully visible within it.
 const ROWS: usize = 10_000;
 const AFTER_TOUCH_S: f64 = 0.4;
 
@@ -27,16 +27,16 @@ pub struct DeviceFound {
     pub word: String,
     /// And its sentence.
     pub sentence: String,
-    /// Physics that the model leaves out, most important first.
+    /// Effects that the model leaves out, most important first.
     pub physics: Vec<PhysicsFound>,
-    /// Numbers of the model that are others: path, as the model has it, as it is.
+    /// Parameters of the model that differ: path, value in the model, true value.
     pub numbers: Vec<NumberFound>,
     /// The device with all that.
     #[serde(skip)]
     pub files: Option<Box<DeviceFiles>>,
 }
 
-/// A physics at a place.
+/// An effect at a place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhysicsFound {
     /// Its name.
@@ -47,7 +47,7 @@ pub struct PhysicsFound {
     pub family: Option<Family>,
     /// How sure it is that something of the kind acts there, 0 to 1.
     pub confidence: f64,
-    /// Its most telling number, with unit.
+    /// Its most informative parameter, with unit.
     pub size: Option<(String, f64, String)>,
     /// Whether it acts on the way of a signal.
     pub of_signal: bool,
@@ -60,7 +60,7 @@ pub struct NumberFound {
     pub path: String,
     /// In the graph's model.
     pub declared: f64,
-    /// As it is.
+    /// The value that was found.
     pub found: f64,
     /// Whether it belongs to the hand's grip.
     pub of_grip: bool,
@@ -131,7 +131,7 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
         real_sensors: *real_sensors,
         grip_changes: Vec::new(),
     };
-    // First with the numbers as the graph has them: one effect that explains everything beside them is the simplest answer. Then with other numbers.
+    // First with the graph's parameters: one effect that explains everything beside them is the simplest answer. Then with other parameters.
     let fixed = Problem { stated: Vec::new(), ..problem.clone() };
     let mut best: Option<Explained> = None;
     for problem in [&fixed, &problem] {
@@ -191,7 +191,7 @@ fn explained(problem: &Problem, patience: Duration, stop: &AtomicBool) -> Option
     let best = search.found.iter().chain([&search.nominal]).min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let left = level(&best.levels) / given;
     let family = |c: &Candidate| c.structure.added.first().map(|h| h.physics.family);
-    // How much more the best of another kind leaves says how sure the kind is.
+    // The additional residual of the best of another kind shows how certain the kind is.
     let rival = search
         .found
         .iter()

@@ -1,4 +1,4 @@
-//! A place where a recording is not what its graph says.
+//! A place where a recording differs from its graph.
 
 use crate::device::DeviceFound;
 use backdrive_nodes::graph::{Graph, NodeKind};
@@ -25,22 +25,22 @@ pub struct Difference {
     pub compared: Compared,
     /// Input port that is late, where a delay explains it and the way to that port is where it fits.
     pub way: Option<String>,
-    /// What a diagnosis says of the device, where nothing simple explains it.
+    /// The diagnosis of the device, where nothing simple explains it.
     pub device: Option<DeviceFound>,
 }
 
-/// A loss above this share is told beside jitter.
+/// A loss above this share is reported beside jitter.
 const TOLD_BESIDE_JITTER: f64 = 0.1;
 
 impl Difference {
-    /// What the way to a port does besides what the graph says of it.
+    /// Impairments of the way to a port besides those in the graph.
     pub fn impairment(&self, period_s: f64, seed: u64) -> Option<Impairment> {
         let s = |rows: usize| rows as f64 * period_s;
         self.way.as_ref()?;
         match self.compared.as_if {
             AsIf::Changed { late, .. } => Some(Impairment { delay_s: s(late), jitter_s: 0.0, loss: 0.0, seed }),
             AsIf::Unsteady { late, jitter, missing } => {
-                // Beside jitter a small loss cannot be told from what is overtaken.
+                // Beside jitter a small loss cannot be distinguished from samples that are overtaken.
                 let loss = if jitter == 0 || missing > TOLD_BESIDE_JITTER { missing } else { 0.0 };
                 Some(Impairment { delay_s: s(late), jitter_s: s(jitter), loss, seed })
             }
@@ -49,7 +49,7 @@ impl Difference {
     }
 }
 
-/// Makes a way in a graph as late as it was found.
+/// Gives a way in a graph the delay that was found.
 pub fn delay(graph: &mut Graph, node: usize, difference: &Difference) {
     let (period_s, seed) = (graph.period_s(), graph.seed.wrapping_add(7));
     let (Some(port), Some(more)) = (&difference.way, difference.impairment(period_s, seed)) else { return };

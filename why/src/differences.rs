@@ -16,11 +16,11 @@ use std::time::Duration;
 pub struct Differences {
     /// Where something differs.
     pub found: Vec<Difference>,
-    /// What could not be looked at, and why.
+    /// What could not be examined, and why.
     pub notes: Vec<String>,
 }
 
-/// Outputs whose samples tell something, by node kind: port, quantity, and the input whose way carries it.
+/// Outputs whose samples have information, by node kind: port, quantity, and the input whose way carries it.
 const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
     (NodeKind::Canceller, "motion", Quantity::Position, "measured", true),
     (NodeKind::Scaling, "command", Quantity::Position, "motion", true),
@@ -39,11 +39,11 @@ const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
 pub struct Look {
     /// A difference below this share of a signal counts as none.
     pub small: f64,
-    /// How long a search for physics of the master may take on the clock.
+    /// How long a search for effects in the master may take on the clock.
     pub patience: Duration,
 }
 
-/// Compares every node of a graph with its bag; `hear` is told which.
+/// Compares every node of a graph with its bag; `hear` receives its name.
 ///
 /// # Errors
 /// A node that cannot be built.
@@ -106,7 +106,7 @@ fn late(compared: &Compared) -> bool {
 /// A port of [`TOLD`].
 type Port = (NodeKind, &'static str, Quantity, &'static str, bool);
 
-/// Compares the outputs of one node. Where a way to it turns out to be late the node is looked at again with it so, so that one delay is not
+/// Compares the outputs of one node. Where a way to it turns out to be late the node is examined again with this delay, so that one delay is not
 /// taken for several things.
 fn of_node(
     graph: &Graph,
@@ -178,7 +178,7 @@ fn is_known(settings: &Settings) -> bool {
     }
 }
 
-/// What the model says of the sensor of a master's position.
+/// The model of the sensor of a master's position.
 fn sensor_of(settings: &Settings, quantity: Quantity, axis: usize) -> Sensor {
     let (Settings::Master(DeviceFiles { model: Some(model), real_sensors: true, .. }), Quantity::Position) = (settings, quantity) else {
         return Sensor::default();

@@ -14,20 +14,20 @@ use backdrive_stability::session::{AxisSignals, Session};
 use backdrive_stability::verdict::{Question, Swapped, answer, is_coupled};
 use std::sync::atomic::AtomicBool;
 
-/// A lower gain is so far below the edge that was measured.
+/// A lower gain is this share of the measured critical gain.
 const BELOW: f64 = 0.8;
 
-/// A delay is a suspect from so many rows on; less is the one step that every sampled loop has.
+/// A delay is a suspect from this number of rows on; less is the one step that every sampled loop has.
 const LEAST_LATE: usize = 3;
 
-/// Answers of a session that was read by a roles file: what happens, how late and how large each way is, and where the measured loop has its edge.
-/// No loop is run again, for no model of it is known.
+/// Answers for a session that was read by a roles file: what happens, how late and how large each way is, and the critical gain of the measured loop.
+/// There is no re-simulation, because no model of the loop is known.
 pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
     let happening = happening_of(session, gain);
     let (measured, mut notes) = measured(session, gain);
     let edge = measured.edge;
     let mut causes: Vec<(Cause, f64)> = session.axes.iter().flat_map(|axis| of_axis(axis, session, gain, &happening)).collect();
-    // What a dead sensor would have told is not in the loop; whether the loop needed it nobody says.
+    // The signal of a dead sensor is not in the loop; whether the loop needed it is not known.
     let dead = session.sensors.iter().map(|fault| (cause(CauseKind::DeadSensor, fault.signal.clone(), fault.to_string(), false), DEAD));
     causes.extend(dead);
     let differs = causes.iter().map(|(c, _)| c.evidence.clone()).collect();
@@ -71,7 +71,7 @@ pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
 /// A dead sensor that may be no part of the loop weighs so much.
 const DEAD: f64 = 0.3;
 
-/// What happens; of a pair of coupled motors as it is judged while the hand moves.
+/// What happens; for a pair of coupled motors the judgement while the hand moves.
 fn happening_of(session: &Session, gain: Gain) -> Happening {
     let judged = is_coupled(session).then(|| {
         let question = Question {
@@ -93,10 +93,10 @@ fn happening_of(session: &Session, gain: Gain) -> Happening {
     }
 }
 
-/// What was not run again is not sure.
+/// A result without a re-simulation is not certain.
 const SURE: f64 = 0.7;
 
-/// The edge of the measured loop.
+/// The stability limit of the measured loop.
 struct Measured {
     edge: Option<f64>,
     why_not: Option<String>,

@@ -15,7 +15,7 @@ const LOWEST_HZ: f64 = 8.0;
 /// What rings on for more periods than this before it has fallen to a third is ringing.
 const RINGS: f64 = 3.0;
 
-/// After a touch it is looked at for so long, s.
+/// Time after a touch that is evaluated, s.
 const AFTER_TOUCH_S: f64 = 0.5;
 
 /// Ringing below this is not felt, m or rad.
@@ -112,7 +112,7 @@ impl Happening {
         }
     }
 
-    /// Of a loop that was run again.
+    /// Of a loop that was re-simulated.
     pub fn of_run(run: &Run) -> Happening {
         let hz = run.frequency_hz.unwrap_or(0.0);
         match Happening::of_outcome(run.outcome, &[]) {
@@ -121,7 +121,7 @@ impl Happening {
         }
     }
 
-    /// Whether something happens that nobody wants.
+    /// Whether something undesired happens.
     pub fn is_trouble(&self) -> bool {
         !matches!(self, Happening::Nothing | Happening::NotJudged { .. })
     }

@@ -79,7 +79,7 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
     }
 }
 
-/// What a diagnosis of the master says, as a cause.
+/// The diagnosis of the master, as a cause.
 fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String, String) {
     let kind_of = |f: &PhysicsFound| match (f.family, f.of_signal) {
         (Some(Family::Friction), _) => CauseKind::DryFriction,

@@ -1,5 +1,5 @@
-//! Whether one wrong number makes a master do what was recorded: a firmer or softer hand, more or less mass. Tried before any physics is, for
-//! one number that explains everything is the simplest answer.
+//! Whether one wrong parameter makes a master do what was recorded: a firmer or softer hand, more or less mass. Tried before any effect, because one
+//! parameter that explains everything is the simplest answer.
 
 use crate::device::{DeviceFound, NumberFound};
 use backdrive_nodes::graph::{DeviceFiles, Graph, Settings};
@@ -70,8 +70,8 @@ impl Number {
     }
 }
 
-/// Looks for one number, or two of the grip, with which the master `node` does what was recorded, and says which share it leaves; `share` is by how
-/// much it differs as it is.
+/// Searches for one parameter, or two of the grip, with which the master `node` does what was recorded, and returns the remaining share; `share` is
+/// the difference without a change.
 pub fn wrong_number(graph: &Graph, node: &str, axis: usize, recorded: &Recorded, share: f64) -> Option<(DeviceFound, f64)> {
     let index = graph.nodes.iter().position(|n| n.name == node)?;
     let Settings::Master(files) = &graph.nodes[index].settings else { return None };

@@ -1,4 +1,4 @@
-//! What would stop it: changes, each with the loop run again, ranked by what they leave of force and motion.
+//! What would stop it: changes, each with a re-simulation, ranked by what they leave of force and motion.
 
 use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
@@ -20,16 +20,16 @@ const FIRMNESS: [f64; 3] = [1.0, 0.85, 1.15];
 /// And at a gain so much higher.
 const MARGIN: f64 = 1.25;
 
-/// A lower gain is so far below the edge.
+/// A lower gain is this share of the critical gain.
 const BELOW: f64 = 0.8;
 
 /// Damping that is tried, N s/m, or as many thousandths of N m s/rad.
 const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
 
-/// Share of dry friction that a compensation makes up for: with more a friction that is less than it was taken for would be driven.
+/// Share of dry friction that a compensation covers: with more, a friction that is lower than assumed would be driven.
 const COMPENSATED: f64 = 0.8;
 
-/// Laws that are tried in the place of scaling.
+/// Laws that are tried instead of scaling.
 const COUPLINGS: [&str; 4] = ["wave", "passivity", "position_position", "virtual_coupling"];
 
 /// Corner of a high-pass that is tried, Hz.
@@ -65,7 +65,7 @@ pub struct Remedy {
 }
 
 impl Remedy {
-    /// What is left of force and motion together, 0 to 1.
+    /// Remaining share of force and motion together, 0 to 1.
     pub fn kept(&self) -> f64 {
         self.force_kept * self.motion_kept
     }
@@ -269,7 +269,7 @@ fn force_kept(session: &Session, lambda: f64) -> f64 {
     if whole > 0.0 { (felt / whole).min(1.0) } else { 1.0 }
 }
 
-/// How much of what the hand alone would do in free motion the slave is told to do.
+/// Share of the hand's free motion that is commanded to the slave.
 fn motion_kept(session: &Session, free: &Option<Session>, mu: f64) -> f64 {
     let Some(free) = free else { return 1.0 };
     let times = (free.period_s / session.period_s).max(1e-9);
@@ -293,7 +293,7 @@ fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<
     is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
 }
 
-/// Whether nothing shakes: a limit may act, where nothing would happen without it.
+/// Whether nothing oscillates: a limit may act, where nothing would happen without it.
 ///
 /// # Errors
 /// As a run.

@@ -9,7 +9,7 @@ use backdrive_diagnosis::physics::physics_named;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::model::Model;
 
-/// A thing without which the loop is run again.
+/// A thing without which the loop is re-simulated.
 pub struct Suspect {
     /// What it would be as a cause.
     pub kind: CauseKind,
@@ -119,7 +119,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
 /// A loop slower than this has its rate among the suspects, Hz.
 const LOW_RATE_HZ: f64 = 2000.0;
 
-/// Which physics one model has that another leaves out; of several the one that is worst for a prediction.
+/// Which effect one model has that another leaves out; of several the one that is worst for a prediction.
 fn left_out(real: &Model, model: &Model) -> CauseKind {
     let known: Vec<&str> = model.elements.iter().map(|e| e.law.kind().name).collect();
     let more = real.elements.iter().map(|e| e.law.kind().name).filter(|k| !known.contains(k));

@@ -8,7 +8,7 @@ use serde::Serialize;
 const COUNTS: f64 = 0.1;
 
 /// What a trial does beyond everything that was recorded. A hand is on the device: a remedy that moves or pushes it harder than the fault that it cures is no
-/// improvement for whoever holds it.
+/// improvement for the user.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Throw {
     /// How far the master goes beyond the range in which it was recorded, m or rad; 0 where it does not.

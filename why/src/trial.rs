@@ -1,4 +1,4 @@
-//! A loop that is run again: a graph, and what its sensors do besides.
+//! A loop that is re-simulated: a graph, and what its sensors do besides.
 
 use crate::faulty::{Distortion, Faulty};
 use backdrive_control::core::Core;
@@ -12,7 +12,7 @@ use backdrive_stability::resimulate::{Gain, OwnCores, ResimulateError, Run, RunO
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Edges are looked for within this factor of the gain asked about, either way.
+/// Stability limits are searched within this factor of the gain in question, either way.
 const AROUND: f64 = 20.0;
 
 /// A loop.
@@ -22,7 +22,7 @@ pub struct Trial {
     pub graph: Graph,
     /// What happens to signals.
     pub distortions: Vec<Distortion>,
-    /// Cores of the caller's own in the place of some nodes: a device that is not simulated here.
+    /// The caller's own cores instead of some nodes: a device that is not simulated here.
     pub own: Option<OwnCores>,
 }
 
@@ -37,14 +37,14 @@ impl std::fmt::Debug for Trial {
 pub struct Hand {
     /// Per axis, one row per step of the bag; the graph's own operator where `None`.
     pub intents: Option<Vec<Intent>>,
-    /// Steps of the bag that are run again.
+    /// Steps of the bag that are re-simulated.
     pub steps: u64,
     /// The bag's rate, Hz.
     pub rate_hz: f64,
 }
 
 impl Trial {
-    /// A graph as it is.
+    /// An unchanged graph.
     pub fn of(graph: Graph) -> Trial {
         Trial { graph, distortions: Vec::new(), own: None }
     }
@@ -64,7 +64,7 @@ impl Trial {
         })
     }
 
-    /// The cores of nodes that are not as the graph says; `None` where all are.
+    /// The cores of nodes that differ from the graph; `None` where none does.
     pub fn cores(&self) -> Option<OwnCores> {
         if self.distortions.is_empty() {
             return self.own.clone();
@@ -106,7 +106,7 @@ impl Trial {
         edge(&self.scenario(hand)?, &search, &RunOptions::default(), &|_, _| {}, cancel)
     }
 
-    /// Whether it is stable at a gain with the hand as it is and gripping less and more firmly.
+    /// Whether it is stable at a gain with the present hand and with softer and firmer grips.
     ///
     /// # Errors
     /// As [`Trial::run`].

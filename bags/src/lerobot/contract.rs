@@ -134,7 +134,7 @@ impl Contract {
         feature.as_deref()
     }
 
-    /// What it says of a joint that is none of the dataset's, which would be without effect: a sentence.
+    /// An entry for a joint that is none of the dataset's, which would be without effect: a sentence.
     pub(crate) fn unknown_joint(&self, joints: &[String]) -> Option<String> {
         let each = |of: &PerJoint| match of {
             PerJoint::All(_) => Vec::new(),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// A feature of more numbers is none of joints; the file may say anything.
 const MOST_JOINTS: usize = 10_000;
 
-/// What a dataset says of itself.
+/// A dataset's description of itself.
 pub(crate) struct Info {
     path: PathBuf,
     /// Frames a second.
@@ -69,7 +69,7 @@ impl Info {
         let names: Vec<String> = names.iter().map(plain).collect();
         let joints: Vec<String> =
             names.iter().map(|name| name.rsplit_once('.').map_or(name.as_str(), |(joint, _)| joint).to_owned()).collect();
-        // Where nothing but the end tells joints apart it is no name of a quantity: arm.1, arm.2.
+        // Where joints differ only in the end of a name, it is no name of a quantity: arm.1, arm.2.
         let is_told_apart = |place: usize| !joints[..place].contains(&joints[place]);
         Ok(if (0..count).all(is_told_apart) { joints } else { names })
     }

@@ -96,7 +96,7 @@ pub(crate) fn episode_tables(folder: &Path, options: &LerobotOptions) -> Result<
     let features: Vec<&str> = there.iter().filter_map(|role| contract.feature(*role)).collect();
     let joints = features.iter().map(|feature| info.joints(feature)).collect::<Result<Vec<_>, _>>()?;
     let widths: Vec<usize> = joints.iter().map(Vec::len).collect();
-    // What the contract does not say is told before anything is written.
+    // What the contract lacks is reported before anything is written.
     for (role, joints) in there.iter().zip(&joints) {
         joints.iter().try_for_each(|joint| contract.scale(*role, joint).map(drop)).map_err(BagError::Usage)?;
     }
@@ -123,7 +123,7 @@ pub(crate) fn episode_tables(folder: &Path, options: &LerobotOptions) -> Result<
             }
         }
         if there.contains(&Role::Command) && contract.commanded_at == CommandedAt::Next {
-            // Nobody knows what was sent at the first row.
+            // The command sent at the first row is not known.
             table.drop_first_row();
         }
         tables.push((name, table));

@@ -5,7 +5,7 @@ use crate::parquet_writer::{Values, Written};
 use backdrive_signal::statistics::quantile;
 use serde_json::{Map, Value, json};
 
-/// Quantiles that a dataset tells, by their names.
+/// Quantiles that a dataset contains, by their names.
 const QUANTILES: [(&str, f64); 5] = [("q01", 0.01), ("q10", 0.1), ("q50", 0.5), ("q90", 0.9), ("q99", 0.99)];
 
 /// A feature of all episodes.
@@ -54,7 +54,8 @@ impl Feature<'_> {
         Value::Object(figures.collect::<Map<_, _>>())
     }
 
-    /// Of each episode, which has so many rows: columns `stats/FEATURE/FIGURE` by name, their type, the length of a row's list, and the rows one after the other.
+    /// Of each episode, with its number of rows: columns `stats/FEATURE/FIGURE` by name, their type, the length of a row's list, and the rows one after the
+    /// other.
     pub(super) fn of_episodes(&self, rows: &[usize]) -> Vec<(String, NumberType, usize, Vec<f64>)> {
         let mut columns: Vec<(String, NumberType, usize, Vec<f64>)> = Vec::new();
         let mut from = 0;

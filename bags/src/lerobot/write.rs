@@ -33,8 +33,9 @@ struct Prepared {
     features: Vec<Option<Vec<f64>>>,
 }
 
-/// Writes bags, an episode each, as a dataset into a folder that is there and empty. Columns `JOINT.position` make the feature `observation.state`, `JOINT.command` `action`,
-/// and so on, as the contract says, in its units; features are single precision where that loses nothing, else double. `task` is what the arm was to do.
+/// Writes bags, an episode each, as a dataset into a folder that is there and empty. Columns `JOINT.position` make the feature `observation.state`,
+/// `JOINT.command` `action`, and so on, by the contract, in its units. Features are single precision where that loses nothing, else double. `task` is what the
+/// arm was to do.
 ///
 /// # Errors
 /// A bag has no columns of joints, others than the first, gaps, an uneven clock or another rate; the contract has targets in the row before; the files cannot be written.
@@ -222,7 +223,7 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
     Ok(())
 }
 
-/// A column of the data as a feature that statistics are told of.
+/// A column of the data as a feature with statistics.
 fn feature_of<'a>(column: &'a Written) -> Option<Feature<'a>> {
     let (values, width) = match column.values {
         Values::Numbers(values, _) => (values, 1),

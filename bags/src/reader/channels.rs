@@ -28,7 +28,7 @@ impl Channels {
         }
     }
 
-    /// Whether a channel says which step samples are of.
+    /// Whether a channel states which step samples are of.
     pub(crate) fn says_steps(&self, channel: &mcap::records::Channel) -> bool {
         channel.message_encoding == "cdr" && self.schemas.get(&channel.schema_id).is_some_and(|schema| schema.0 == ros::STEPS.0)
     }

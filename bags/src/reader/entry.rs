@@ -28,7 +28,7 @@ pub struct TopicRef {
     pub schema: Vec<u8>,
     /// What it carries, if its type is one of ours.
     pub kind: Option<Kind>,
-    /// Names of its axes, if the run's header tells them.
+    /// Names of its axes, if the run's header has them.
     pub axes: Vec<String>,
     /// Metadata of its channel.
     pub metadata: BTreeMap<String, String>,
@@ -97,14 +97,14 @@ pub struct Entry {
     pub offset: u64,
     /// Its bytes.
     pub payload: Vec<u8>,
-    /// What the bag says of it beside its bytes, if it is a sample of ours.
+    /// What the bag records of it beside its bytes, if it is a sample of ours.
     pub facts: Option<Facts>,
 }
 
 impl Entry {
     /// The message, if its topic is one of ours; `None` for other people's types, and for their JointStates.
     ///
-    /// Errors: the payload does not hold what its topic says.
+    /// Errors: the payload does not have the content that its topic requires.
     pub fn message(&self, path: &Path) -> Result<Option<Message>, BagError> {
         let Some(kind) = self.topic.kind else { return Ok(None) };
         match decode(kind, self.facts.as_ref(), &self.payload) {
@@ -115,7 +115,7 @@ impl Entry {
     }
 }
 
-/// Reads a payload, with what the bag says of it beside.
+/// Reads a payload, with the facts that the bag records beside it.
 pub(crate) fn decode(kind: Kind, facts: Option<&Facts>, payload: &[u8]) -> Result<Message, ros::RosError> {
     match facts {
         Some(facts) if kind == Kind::Sample => ros::decode_sample(payload, facts).map(Message::Sample),

@@ -33,7 +33,7 @@ pub struct Reader {
     profile: String,
     library: String,
     topics: Vec<Arc<TopicRef>>,
-    /// Channels on which it is said which step samples are of.
+    /// Channels with the steps of samples.
     steps: Vec<u16>,
     counts: Vec<u64>,
     header: Option<BagHeader>,
@@ -45,10 +45,10 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Opens a bag: reads what it says about itself. A bag that was cut off is walked through once.
+    /// Opens a bag: reads its own description. A bag that was cut off is walked through once.
     ///
-    /// What is damaged there is left out and told by [`Reader::damage`]: the messages can be read all the same.
-    /// Errors: it cannot be read or is no MCAP file.
+    /// Damaged parts are left out and listed by [`Reader::damage`]: the messages can be read nevertheless. Errors: it cannot be read or is no MCAP
+    /// file.
     pub fn open(path: &Path) -> Result<Reader, BagError> {
         let bytes = std::fs::metadata(path).map_err(BagError::io(path))?.len();
         let mut frames = Frames::open(path)?;
@@ -123,8 +123,8 @@ impl Reader {
         })
     }
 
-    /// Opens a bag by what stands at its end, and tells from when to when its topics speak: in the same time whatever its size.
-    /// `None` where that does not tell all: it was not closed, or others wrote it without statistics or indices.
+    /// Opens a bag by its end, and returns the first and last time of each topic: in the same time whatever its size. `None` where the end is not
+    /// complete: it was not closed, or others wrote it without statistics or indices.
     pub(crate) fn of_summary(path: &Path) -> Result<Option<(Reader, Spans)>, BagError> {
         let (Some(summary), bytes) = summary::of_file(path).map_err(BagError::io(path))? else { return Ok(None) };
         let Summary { profile, library, found, metadata, attachments, statistics: Some(statistics), spans: Some(spans) } = summary else {
@@ -146,8 +146,8 @@ impl Reader {
         &self.path
     }
 
-    /// Every topic, in the order of the run's header if there is one, then by channel; without that on which a bag of ours says
-    /// which step samples are of, for which see [`Entry::facts`].
+    /// Every topic, in the order of the run's header if there is one, then by channel. The channel on which a bag of ours records the steps of
+    /// samples is left out; see [`Entry::facts`].
     pub fn topics(&self) -> &[Arc<TopicRef>] {
         &self.topics
     }
@@ -216,8 +216,8 @@ impl Reader {
 
     /// Every message in the order of the file.
     ///
-    /// A bag that was cut off ends with its last whole message, without an error: [`Reader::ended_cleanly`] tells.
-    /// Damage before the end is an error with its place, and the iteration ends there.
+    /// A bag that was cut off ends with its last whole message, without an error: [`Reader::ended_cleanly`] shows this. Damage before the end is an
+    /// error with its place, and the iteration ends there.
     pub fn messages(&self) -> Result<Messages, BagError> {
         let topics = self.topics.iter().map(|topic| (topic.channel, topic.clone())).collect();
         Ok(Messages {

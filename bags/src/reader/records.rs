@@ -36,7 +36,7 @@ fn read_records(path: &Path, frame: &Frame, body: &[u8], strict: bool) -> (Vec<R
         let error = (!frame.cut).then(|| damaged(format!("a chunk record of {} bytes is too short for its own header", body.len())));
         return (Vec::new(), error);
     };
-    // Room is made for what a chunk says of its size before anything is unpacked.
+    // The size that a chunk states is allocated before anything is unpacked.
     let most = body.len().saturating_mul(256).clamp(LIKELY_CHUNK, LARGEST_CHUNK);
     let unpacked = body.get(16..24).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes));
     if unpacked > most as u64 {

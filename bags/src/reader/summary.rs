@@ -1,4 +1,4 @@
-//! What a bag says of itself at its end, read without its messages: a bag of any size is looked at in the same time.
+//! A bag's own summary at its end, read without its messages: a bag of any size takes the same time.
 
 use super::attachments::Attachments;
 use super::channels::Channels;
@@ -25,11 +25,11 @@ pub(crate) struct Summary {
     pub(crate) metadata: Vec<Metadata>,
     pub(crate) attachments: Attachments,
     pub(crate) statistics: Option<Statistics>,
-    /// `None` where neither the recorder nor MCAP's indices tell.
+    /// `None` where neither the recorder nor MCAP's indices have them.
     pub(crate) spans: Option<Spans>,
 }
 
-/// Reads it; `None` where there is none, or not all of what is needed, or something of it is damaged: then only a walk over the whole file tells.
+/// Reads it; `None` where there is none, or it is incomplete or damaged: then only a walk over the whole file gives the answer.
 pub(crate) fn summary<R: Read + Seek>(path: &Path, source: &mut R, size: u64) -> Option<Summary> {
     let mut source = Source { path, source, size };
     if source.bytes(0, mcap::MAGIC.len() as u64)? != mcap::MAGIC {
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// A bag of ours, or one with MCAP's indices, with so many steps.
+    /// A bag of ours, or one with MCAP's indices, with this number of steps.
     fn bag(steps: u64, indexed: bool) -> Vec<u8> {
         use crate::{BagHeader, Recorder, RecorderOptions, TopicInfo};
         use backdrive_msgs::topic::{Kind, Topic};

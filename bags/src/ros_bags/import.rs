@@ -33,7 +33,7 @@ fn begins(path: &Path, with: &[u8]) -> bool {
 }
 
 /// Copies the messages of a ROS bag into an MCAP file that any ROS 2 tool opens: those of rosbag2 verbatim, those of ROS 1 in the form of ROS 2. A topic whose
-/// definition cannot be read is kept as it is, and told.
+/// definition cannot be read is kept unchanged, and reported.
 ///
 /// `most_bytes` is what one chunk of a ROS 1 bag may unpack to, see [`crate::MOST_BYTES`].
 ///

@@ -60,7 +60,7 @@ pub(crate) fn copy(file: &Path, target: &mut Target, most_bytes: u64) -> Result<
     Ok(())
 }
 
-/// The reader takes on trust where the file says that its chunks end; a bag that was not closed, or cut off, says what is not so.
+/// The reader takes on trust the stated end of the chunks; in a bag that was not closed, or cut off, it is wrong.
 fn check_extent(file: &Path) -> Result<(), BagError> {
     let wrong = |what: &str| Err(BagError::File { path: file.to_owned(), what: what.to_owned() });
     let mut start = Vec::new();
@@ -87,7 +87,7 @@ fn check_extent(file: &Path) -> Result<(), BagError> {
     }
 }
 
-/// The reader unpacks a chunk whole, and makes room for what the chunk says of its size. Only the heads of records are read here.
+/// The reader unpacks a chunk whole, and allocates the size that the chunk states. Only the heads of records are read here.
 fn check_chunks(file: &Path, most_bytes: u64) -> Result<(), String> {
     let Ok(open) = backdrive_plant::input_file::open(file) else { return Ok(()) };
     let mut bytes = BufReader::new(open);
@@ -123,7 +123,7 @@ const CHUNK: u8 = 5;
 /// Bytes of `#ROSBAG V2.0` and a line feed.
 const MAGIC: usize = 13;
 
-/// The field that tells where the index begins.
+/// The field with the position at which the index begins.
 const INDEX: &[u8] = b"index_pos=";
 
 fn announce(target: &mut Target, name: &str, type_name: &str, definition: &str) -> Result<Topic, BagError> {

@@ -61,7 +61,7 @@ impl Converter {
     /// Writes a message in the form of ROS 2 in place of what `out` holds.
     ///
     /// # Errors
-    /// A sentence: the message is not what the definition says.
+    /// A sentence: the message does not match the definition.
     pub(crate) fn convert(&self, message: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
         out.clear();
         out.extend(ENCAPSULATION);

@@ -52,7 +52,7 @@ pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
     Ok(())
 }
 
-/// What the bag itself says of its types; since ROS 2 Iron.
+/// The bag's own definitions of its types; since ROS 2 Iron.
 fn definitions_of(database: &Connection) -> HashMap<String, String> {
     let read = || -> rusqlite::Result<HashMap<String, String>> {
         let mut query =

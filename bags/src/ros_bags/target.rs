@@ -1,4 +1,4 @@
-//! The MCAP file that messages of others go into, and what is to be said of them.
+//! The MCAP file for other people's messages, and the information on them.
 
 use crate::cdr::{FieldPath, Schema};
 use crate::whole::Whole;
@@ -141,7 +141,7 @@ impl Target {
         Ok(())
     }
 
-    /// Ends the bag. One without a message is removed again, and its report says 0 messages.
+    /// Ends the bag. One without a message is removed again, and its report has 0 messages.
     pub(crate) fn finish(mut self) -> Result<RosbagReport, BagError> {
         self.mcap.finish().map_err(failed(&self.path))?;
         if self.topics.iter().any(|topic| topic.told.messages > 0) {

@@ -43,7 +43,7 @@ pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Sign
             for axis in (0..MAX_AXES).filter(|axis| seen[*axis]) {
                 let name = topic.axes.get(axis).cloned().unwrap_or_else(|| format!("axis{axis}"));
                 let field = format!("{}[{axis}]", quantity.field());
-                // A column that was imported is called as it was in its table.
+                // An imported column has the name that it had in its table.
                 let own = was_table(reader) && axis == 0 && *quantity == Quantity::Position && topic.name == topic_of(&name);
                 let shown = if own { name } else { format!("{}.{}.{name}", topic.name, quantity.field()) };
                 wanted.push(Signal::new(&shown, &topic.name, &field));
@@ -72,7 +72,7 @@ struct Foreign {
     changes: bool,
 }
 
-/// Messages of so many sizes are looked at; text in them makes every one of another size.
+/// Messages of this number of sizes are examined; text in them makes every one of another size.
 const MOST_SIZES: usize = 64;
 
 impl Foreign {

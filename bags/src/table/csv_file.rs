@@ -8,8 +8,8 @@ use crate::number_type::NumberType;
 use backdrive_plant::recording::{NO_HEADING, TextTable, comma_remark, is_no_heading};
 use std::path::Path;
 
-/// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an
-/// error, as is an empty cell or `nan` of a column that goes into the bag.
+/// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is
+/// requested. Then that is an error, as is an empty cell or `nan` of a column that goes into the bag.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
     read_cells(path, options, Missing::IsWrong)
 }

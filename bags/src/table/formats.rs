@@ -1,4 +1,4 @@
-//! The formats of tables, and how a file tells which one it is.
+//! The formats of tables, and how the format of a file is recognised.
 
 use super::csv_file::Missing;
 use super::mapping::{ImportOptions, ImportReport};
@@ -78,7 +78,7 @@ impl TableFormat {
             Some(TableFormat::Mat) => wrong(
                 "is not a MATLAB file of version 5: it does not start with \"MATLAB 5.0 MAT-file\"; save it again with save(..., '-v7')",
             ),
-            // Text in UTF-16 has zeros too, and is told as such where its rows are read.
+            // Text in UTF-16 has zeros too, and is reported as such where its rows are read.
             _ if start.contains(&0) && !start.starts_with(b"\xff\xfe") && !start.starts_with(b"\xfe\xff") => {
                 wrong("is neither text nor a file of another format that is known (parquet, MATLAB, ROS bag)")
             }
@@ -100,10 +100,10 @@ impl TableFormat {
 
 /// Turns a table, which is one experiment, into a bag that [`crate::signals()`] reads the same numbers from.
 ///
-/// A row is a step, its stamp the row's time to the ns; the exact time is in `position[0]` of `/recording/t`. A heading may name its unit
-/// (`x [mm]`): the bag holds SI units. The bag remembers what the numbers of a column were in the file, and [`export_table`] writes them so again.
-/// As where a table is read as it is, an empty cell or `nan` is an error. Errors: the file cannot be read, a column is missing, a time is no number or
-/// goes back, a mapped cell is no number, `bag` exists or cannot be written.
+/// A row is a step, its stamp the row's time to the ns; the exact time is in `position[0]` of `/recording/t`. A heading may name its unit (`x [mm]`):
+/// the bag holds SI units. The bag remembers what the numbers of a column were in the file, and [`export_table`] writes them so again. As where a
+/// table is read directly, an empty cell or `nan` is an error. Errors: the file cannot be read, a column is missing, a time is no number or goes back,
+/// a mapped cell is no number, `bag` exists or cannot be written.
 pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
     to_bag::write_bag(table, &read_table(table, options, Missing::IsWrong)?, bag, options)
 }
@@ -131,7 +131,7 @@ pub(crate) fn read_table(table: &Path, options: &ImportOptions, missing: Missing
     Ok(read)
 }
 
-/// As [`import_table`], of a file that is CSV whatever its ending says.
+/// As [`import_table`], of a file that is CSV whatever its extension.
 ///
 /// # Errors
 /// As of [`import_table`].

@@ -136,7 +136,7 @@ impl<'a> Bytes<'a> {
         let flags = flags.word()?;
         let (class, marks) = (flags as u8, (flags >> 8) as u8);
         if class == CLASS_OPAQUE {
-            // It has no size; what it holds is told nowhere.
+            // It has no size; its content is not documented.
             let (_, _, name) = self.element()?;
             let name = String::from_utf8_lossy(name.bytes).into_owned();
             return Ok(Array { name, size: Vec::new(), held: Held::Other("an object such as a table, a string or a date") });

@@ -30,7 +30,7 @@ pub(crate) const CLASS_OPAQUE: u8 = 17;
 pub(crate) const FLAG_LOGICAL: u8 = 2;
 pub(crate) const FLAG_COMPLEX: u8 = 8;
 
-/// Where names that MATLAB does not take are told: text, a row a column, "name = heading".
+/// Where names that MATLAB does not take are listed: text, a row a column, "name = heading".
 pub(crate) const NAMES: &str = "backdrive_names";
 
 /// Of a class of numbers: what they are; and the type of the elements that hold them in full.

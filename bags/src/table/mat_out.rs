@@ -14,8 +14,8 @@ use std::path::Path;
 /// Longest name that MATLAB takes.
 const LONGEST_NAME: usize = 63;
 
-/// Writes the columns of numbers as standing vectors, each with its class. Headings that are no names for MATLAB are changed, and told; the file has them in
-/// `backdrive_names`, by which an import gives them back.
+/// Writes the columns of numbers as standing vectors, each with its class. Headings that are no names for MATLAB are changed, and reported; the file lists
+/// them in `backdrive_names`, from which an import restores them.
 pub(crate) fn write(table: &Table, out: &Path) -> Result<Vec<String>, BagError> {
     let file = File::create_new(out).map_err(BagError::create(out))?;
     let failed = |error: std::io::Error| BagError::Write { name: out.display().to_string(), what: error.to_string() };

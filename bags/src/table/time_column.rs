@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The times of the rows.
 pub(super) struct Times<'a> {
-    /// Place of their column; `None` where the rate tells them.
+    /// Place of their column; `None` where the rate gives them.
     pub(super) place: Option<usize>,
     /// s, rising.
     pub(super) values: Cow<'a, [f64]>,
@@ -19,7 +19,7 @@ pub(super) struct Times<'a> {
     pub(super) note: Option<String>,
 }
 
-/// Steps from which on times are not taken for seconds, s: nobody records so slowly, and ns or us that nobody names look like this.
+/// Steps above which times are not taken for seconds, s: no recording is that slow, and ns or us without a unit look like this.
 const NO_SECONDS: f64 = 1000.0;
 
 /// Finds the column that is asked for: by its heading, by its name, or as `NAME [unit]` where its heading names no unit.

@@ -27,7 +27,7 @@ struct Known<'a> {
     of: NumberType,
 }
 
-/// What goes where: the place of its topic, how it gets there, its numbers.
+/// What goes where: the place of its topic, how it gets there, and its values.
 struct Source<'a> {
     topic: usize,
     quantity: Quantity,

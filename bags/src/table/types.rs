@@ -134,7 +134,7 @@ impl Table {
         self.wrong_columns(path, what)
     }
 
-    /// An error at a row (from 0), told as a person counts in such a file.
+    /// An error at a row (from 0), counted as a person counts in such a file.
     pub(crate) fn wrong(&self, path: &Path, row: usize, what: String) -> BagError {
         match &self.lines {
             Some(lines) => BagError::Table { path: path.to_owned(), line: lines.rows.get(row).copied().unwrap_or(lines.heading), what },

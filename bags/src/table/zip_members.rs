@@ -8,7 +8,7 @@ use std::io::Read;
 const END: &[u8] = b"PK\x05\x06";
 const ENTRY: &[u8] = b"PK\x01\x02";
 const LOCAL: &[u8] = b"PK\x03\x04";
-/// Bytes of the record at the end, whose comment may have as many as 16 bits tell.
+/// Bytes of the record at the end, whose comment is limited by a 16-bit length.
 const END_LENGTH: usize = 22;
 /// What a size or a place is where it stands in a record for files of 4 GB and more.
 const ELSEWHERE: usize = u32::MAX as usize;

@@ -138,7 +138,7 @@ pub fn texts(messages: &[(usize, Message)]) -> Vec<String> {
     messages.iter().map(|(topic, message)| text(*topic, message)).collect()
 }
 
-/// A bag of a run of so many steps.
+/// A bag of a run of this number of steps.
 pub fn record(path: &Path, steps: u64) {
     use backdrive_bags::{Recorder, RecorderOptions};
     let options = RecorderOptions { overwrite: true, chunk_bytes: 64 << 10, ..RecorderOptions::lockstep() };

@@ -1,4 +1,4 @@
-//! The controller of a slave that is driven by a force: it makes the tip go where the command says.
+//! The controller of a slave that is driven by a force: it moves the tip to the commanded position.
 //!
 //! A law is a pure function of (reference, state) and its own memory: [`pd`], [`sliding_mode`], [`backstepping`], each one a file. What a
 //! law knows of the axis, inertia and friction, is a model's ([`axis`]), which need not be the real one.

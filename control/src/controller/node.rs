@@ -9,8 +9,8 @@ use backdrive_plant::model::Model;
 /// Inputs `command` (position: where the tip shall be), `measured` (position of the tip, one step old); output `force` (effort for the
 /// slave's motor).
 ///
-/// Before the first command it holds the axis where it is. Without a new command it holds the last one; without a measurement it says
-/// nothing, and the slave takes its force away. The command is cut to the travel and speed of the model's axis.
+/// Before the first command it holds the axis where it is. Without a new command it holds the last one; without a measurement it publishes nothing,
+/// and the slave removes its force. The command is cut to the travel and speed of the model's axis.
 pub struct Controller {
     axes: Vec<OneAxis>,
     command: Freshness,

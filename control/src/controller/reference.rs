@@ -27,7 +27,7 @@ impl ReferenceFilter {
         let (at, before) = self.at.unwrap_or(at_rest);
         let (w, t) = (self.rate, self.period_s);
         let speed = (command - before) / t;
-        // Behind a ramp by 2/w of its speed, and what is left of the motion before dies.
+        // Behind a ramp by 2/w of its speed, and the remaining part of the earlier motion decays.
         let lag = 2.0 * speed / w;
         let (left, left_speed) = (at.position - before + lag, at.velocity - speed);
         let slope = left_speed + w * left;

@@ -33,7 +33,7 @@ pub enum Feedforward {
 /// Why a controller cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ControllerError {
-    /// The law needs what only a model says.
+    /// The law needs values that only a model provides.
     #[error("law \"{law}\" needs a model: it says the axis' inertia and friction")]
     NeedsModel {
         /// Name of the law.

@@ -1,15 +1,14 @@
 //! Four channels: positions and forces both ways.
 //!
-//! Lawrence, "Stability and transparency in bilateral teleoperation", IEEE Trans. Robotics and Automation 9, 1993, with the choice
-//! that is transparent: C1 = Z_s + C_s, C2 = C3 = 1, C4 = -(Z_m + C_m). The slave's side is exact, for the inertia that stands for
-//! the slave is the law's own: x_s = x_m + d, where M d'' + B d' + K d = F_hand + F_environment. At the master C_m = B + K/s acts
-//! between the positions, and the term of its inertia Z_m = m s needs the slave's acceleration. That is not differentiated but taken
-//! from forces: a_s = a_m + d'' with m a_m = F_hand + F, for which the hand's force is known here (Hashtrudi-Zaad & Salcudean,
-//! "Transparency in time-delayed systems and the effect of local force feedback", IEEE Trans. Robotics and Automation 18, 2002).
-//! As F then depends on the F of the step before, only a share of the inertia may be taken away, below 1. Without `master_mass` the
-//! term is left out, and the hand feels the master's inertia.
+//! Lawrence, "Stability and transparency in bilateral teleoperation", IEEE Trans. Robotics and Automation 9, 1993, with the choice that is
+//! transparent: C1 = Z_s + C_s, C2 = C3 = 1, C4 = -(Z_m + C_m). The slave's side is exact, for the inertia that stands for the slave is the law's
+//! own: x_s = x_m + d, where M d'' + B d' + K d = F_hand + F_environment. At the master C_m = B + K/s acts between the positions, and the term of its
+//! inertia Z_m = m s needs the slave's acceleration. That is not differentiated but computed from forces: a_s = a_m + d'' with m a_m = F_hand + F,
+//! for which the hand's force is known here. The source is Hashtrudi-Zaad & Salcudean ("Transparency in time-delayed systems and the effect of local
+//! force feedback", IEEE Trans. Robotics and Automation 18, 2002). As F then depends on the F of the step before, only a share of the inertia may be
+//! taken away, below 1. Without `master_mass` the term is left out, and the hand feels the master's inertia.
 //!
-//! With ideal parts and no delay the impedance that the hand feels is that of the environment and what is left of the inertia. With a delay it is not passive.
+//! With ideal parts and no delay the impedance that the hand feels is that of the environment and of the remaining inertia. With a delay it is not passive.
 //!
 //! Packets: forward position, acceleration (as velocity) and force of the hand; back x_s + (B/K) v_s as position, the slave's
 //! acceleration (as velocity) and the force of the environment.

@@ -1,8 +1,8 @@
 //! What couples master and slave over a link: laws that are rivals of plain scaling with a canceller.
 //!
-//! A law has two sides. The side at the master ([`Near`]) is told how the master moves and says which force it shall feel; the
-//! side at the slave ([`Far`]) is told what the slave touches and says where it shall be. They know of each other only by the
-//! [`Packet`]s that cross the link, so that delay, jitter and loss act on these and on nothing else.
+//! A law has two sides. The side at the master ([`Near`]) receives the motion of the master and computes the reflected force. The side at the slave
+//! ([`Far`]) receives the contact force and computes the command for the slave. They know of each other only by the [`Packet`]s that cross the link,
+//! so that delay, jitter and loss act on these and on nothing else.
 //!
 //! Everything here is in the slave's units: the node ([`node`]) multiplies the master's motion by mu before it hands it to a law,
 //! and the law's force by lambda behind it. Power at the master is then lambda/mu times power here, so that a law that is passive
@@ -51,7 +51,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// Names in graph files, with the law as it is by default.
+    /// Names in graph files, with the law at its defaults.
     pub const ALL: [(&'static str, Law); 6] = [
         ("direct", Law::Direct),
         ("wave", Law::Wave(wave::Settings::DEFAULT)),

@@ -7,7 +7,7 @@ use crate::freshness::{Freshness, bridged_steps};
 use crate::scaling::{GainPlan, Ramp};
 use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
-/// A force scale below this gives no force, and none of the hand is sent: dividing by it would tell nothing.
+/// A force scale below this gives no force, and none of the hand is sent: dividing by it would give no information.
 const LEAST_LAMBDA: f64 = 1e-9;
 
 /// The end of the link at one side.
@@ -51,10 +51,10 @@ fn known(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }
 
-/// Inputs `motion` (position of the master), `from_far` (the link), `hand` (effort: the force of the hand on the master, for laws that
-/// need it); outputs `force` (effort F_f = lambda times the law's), `to_far` (the link).
+/// Inputs: `motion` (position of the master), `from_far` (the link), `hand` (effort: the force of the hand on the master, for laws that need it).
+/// Outputs: `force` (effort F_f = lambda times the law's), `to_far` (the link).
 ///
-/// When packets stop coming the force is not measured and the master lets go, as with [`crate::scaling::Backward`].
+/// When packets stop coming the force is not measured and the master removes its force, as with [`crate::scaling::Backward`].
 pub struct NearNode {
     plan: GainPlan,
     changes_done: usize,
@@ -68,7 +68,7 @@ pub struct NearNode {
 }
 
 impl NearNode {
-    /// The side at the master for so many axes. Velocities are told from positions behind a low-pass of the corner `velocity_hz`.
+    /// The side at the master for this number of axes. Velocities are computed from positions behind a low-pass of the corner `velocity_hz`.
     pub fn new(axes: usize, law: &Law, plan: GainPlan, conditions: &Conditions, velocity_hz: f64, stale_after_s: f64) -> NearNode {
         let period_s = conditions.period_s;
         let axis = |_| (law.near(conditions), Velocity::new(velocity_hz, period_s));
@@ -96,7 +96,7 @@ impl Core for NearNode {
         let ([motion, from_far, rest @ ..], [force, to_far, ..]) = (inputs, outputs) else { return };
         let packets = self.link.hear(from_far);
         let hand = rest.first().and_then(|port| self.hand.new_sample(port, |s| s.effort[0]).copied());
-        // Without a measurement there is nothing to say: the far side then holds, and the master lets go.
+        // Without a measurement there is nothing to send: the far side then holds, and the master removes its force.
         let Some(motion) = self.motion.new_sample(motion, |s| s.position[0]).copied() else { return };
         let silent = self.link.is_stale();
         // The link was bridged here already: the master need not bridge it once more.
@@ -133,7 +133,7 @@ impl Core for NearNode {
 /// Inputs `contact` (position, velocity and effort of the slave, one step late), `from_near` (the link); outputs `command` (position),
 /// `to_near` (the link).
 ///
-/// Before the first packet the slave is told to stay where it is. When packets or contact samples stop coming, the law stands still, the slave
+/// Before the first packet the slave is commanded to stay where it is. When packets or contact samples stop coming, the law stands still, the slave
 /// holds, and the packets carry the flag STALE.
 pub struct FarNode {
     period_s: f64,
@@ -147,7 +147,7 @@ pub struct FarNode {
 }
 
 impl FarNode {
-    /// The side at the slave for so many axes.
+    /// The side at the slave for this number of axes.
     pub fn new(axes: usize, law: &Law, conditions: &Conditions, stale_after_s: f64) -> FarNode {
         FarNode {
             period_s: conditions.period_s,

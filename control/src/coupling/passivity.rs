@@ -1,23 +1,23 @@
-//! Time-domain passivity: energy is observed at both ports, and what comes out is cut to what went in at the other.
+//! Time-domain passivity: energy is observed at both ports, and the output is limited to what went in at the other.
 //!
 //! Hannaford & Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18, 2002; with a
 //! delay, Ryu, Artigas & Preusche, "A passive bilateral control scheme for a teleoperator with time-varying communication delay",
 //! Mechatronics 20, 2010. The energy that has gone in at a port is sent along; as it only grows, an old value is never too much.
 //! So at each port, at every step: energy out <= energy that went in at the other port, as last heard, whatever the link does.
 //!
-//! In steps a force acts after it is told: it is held over a step that begins when it arrives. Work is counted when it is done, by the
-//! force that acted and the way that it acted along (exact for a held force: Ryu, Kim & Hannaford, "Stability guaranteed control: time
-//! domain passivity approach", IEEE Trans. Control Systems Technology 12, 2004); what would come out next is told from the present
-//! motion. Where a force acts at once ([`Conditions::held_steps`] 0) energy out never exceeds what went in; else only by what the motion
-//! changes within these steps, and that is taken back before anything more comes out.
+//! In discrete time a force acts after it is computed: it is held over a step that begins when it arrives. Work is counted when it is done, by the
+//! force that acted and its displacement. This is exact for a held force (Ryu, Kim & Hannaford, "Stability guaranteed control: time domain passivity
+//! approach", IEEE Trans. Control Systems Technology 12, 2004). The next output is predicted from the present motion. Where a force acts at once
+//! ([`Conditions::held_steps`] 0) the energy output never exceeds the input. Otherwise it exceeds it only by the change of the motion within these
+//! steps, and that is recovered before more energy is put out.
 //!
 //! At the master the controller takes force away (a damper beside the port), at the slave it takes motion away (a damper in line).
 //! Motion that was taken leaves the slave behind; it catches up as the energy allows (after Artigas, Ryu & Preusche 2010).
 //!
-//! A slave that may give out only what has come in at the master cannot press before a force was felt there, and none is felt before
-//! it presses: with a measured force the two wait for each other. So a damper at the master collects energy from its motion (Franken,
-//! Stramigioli, Misra, Secchi & Macchelli, "Bilateral telemanipulation with time delays: a two-layer approach combining passivity
-//! and transparency", IEEE Trans. Robotics 27, 2011), and what it takes counts as gone in.
+//! A slave that may put out only the energy that has come in at the master cannot press before a force was felt there, and none is felt before it
+//! presses. With a measured force the two therefore wait for each other. So a damper at the master collects energy from its motion (Franken,
+//! Stramigioli, Misra, Secchi & Macchelli, "Bilateral telemanipulation with time delays: a two-layer approach combining passivity and transparency",
+//! IEEE Trans. Robotics 27, 2011), and what it takes counts as gone in.
 //!
 //! Packets: forward position as position, energy in as effort; back the force of the environment as velocity, energy in as
 //! effort, and the slave's position.
@@ -84,7 +84,7 @@ pub struct NearSide {
     observer: Observer,
     contact: f64,
     harvest: f64,
-    /// Forces that were told, by step.
+    /// Forces that were put out, by step.
     told: [f64; MOST_HELD],
     held: u64,
     step: u64,

@@ -1,10 +1,10 @@
 //! Position-position: each side pulls its device to where the other was when last heard, and damps its own.
 //!
-//! Master: F = K (x_s(t - T2) - x_m) - B v_m. Slave: F = K (x_m(t - T1) - x_s) - B v_s, on an inertia that stands for it. With
-//! B >= K (T1 + T2)/2 at both sides its energy stays bounded by what hand and environment put in, for every delay up to these,
-//! constant or varying (Lee & Spong, "Passive bilateral teleoperation with constant time delay", IEEE Trans. Robotics 22, 2006;
-//! Nuño, Basañez & Ortega, "Passivity-based control for bilateral teleoperation: a tutorial", Automatica 47, 2011: P+d controllers,
-//! 4 B_m B_s > (T1 + T2)^2 K^2). No force is measured and positions never drift; moving freely is as heavy as the damping.
+//! Master: F = K (x_s(t - T2) - x_m) - B v_m. Slave: F = K (x_m(t - T1) - x_s) - B v_s, on an inertia that stands for it. With B >= K (T1 + T2)/2 at
+//! both sides its energy stays bounded by the energy from hand and environment, for every delay up to these, constant or varying. Sources: Lee &
+//! Spong ("Passive bilateral teleoperation with constant time delay", IEEE Trans. Robotics 22, 2006) and Nuño, Basañez & Ortega ("Passivity-based
+//! control for bilateral teleoperation: a tutorial", Automatica 47, 2011: P+d controllers, 4 B_m B_s > (T1 + T2)^2 K^2). No force is measured and
+//! positions never drift; moving freely is as heavy as the damping.
 //!
 //! Packets: position and velocity of the own device, both ways.
 

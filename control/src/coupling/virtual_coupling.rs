@@ -1,14 +1,14 @@
 //! Virtual coupling: a spring and a damper between the master's motion and what is touched, with damping injected at the master.
 //!
-//! Colgate & Schenkel, "Passivity of a class of sampled-data systems", J. Robotic Systems 14, 1997; Adams & Hannaford, "Stable
-//! haptic interaction with virtual environments", IEEE Trans. Robotics and Automation 15, 1999 (impedance display with an
-//! environment that takes positions and gives forces). The spring bounds the stiffness that the master can be shown, whatever the
-//! slave touches: a coupling K + B s, sampled with period T, is passive on a device of damping b where b > K T/2 + |B|.
+//! Colgate & Schenkel, "Passivity of a class of sampled-data systems", J. Robotic Systems 14, 1997; Adams & Hannaford, "Stable haptic interaction
+//! with virtual environments", IEEE Trans. Robotics and Automation 15, 1999 (impedance display with an environment that takes positions and gives
+//! forces). The spring bounds the stiffness that the master can display, whatever the slave touches. A coupling K + B s, sampled with period T, is
+//! passive on a device of damping b where b > K T/2 + |B|.
 //!
-//! The coupling sits at the slave, where the environment answers at once; its point moves so that coupling and contact force are
-//! equal. What a delay of the link adds, K times the round trip at low frequency, is injected as damping at the master. That
-//! damper is sampled too, so it does not stand for the device's own b at high frequency, and too much of it shakes the device: by
-//! default the coupling is as soft as the round trip asks for.
+//! The coupling sits at the slave, where the environment answers at once; its point moves so that coupling and contact force are equal. What a delay
+//! of the link adds, K times the round trip at low frequency, is injected as damping at the master. That damper is sampled too, so it does not
+//! replace the device's own b at high frequency, and too much of it makes the device oscillate. By default the coupling is therefore as soft as the
+//! round trip requires.
 //!
 //! Packets: forward position and velocity; back the force of the coupling as effort, and the slave's position.
 

@@ -4,9 +4,9 @@
 //! "Stable adaptive teleoperation", IEEE J. Oceanic Eng. 16, 1991; "Telemanipulation with time delays", IJRR 23, 2004):
 //! u = (b v + F)/sqrt(2b), w = (b v - F)/sqrt(2b), so that F v = (u^2 - w^2)/2 whatever the delay between.
 //!
-//! The slave is moved by a spring and a damper from the line's end; with the damper equal to b ("matched") the wave that arrives
-//! goes into the motion of the slave and none of it straight back (2004, section 5). Because integrals of waves are sent
-//! ([`super::wave_line`]), what is lost on the way does not make the positions drift apart; where the two began counts as the same.
+//! A spring and a damper from the line's end move the slave. With the damper equal to b ("matched") the arriving wave goes into the motion of the
+//! slave, and none of it is reflected (2004, section 5). Because integrals of waves are sent ([`super::wave_line`]), what is lost on the way does not
+//! make the positions drift apart; where the two began counts as the same.
 
 use super::proxy::Proxy;
 use super::side::{Far, Near, Own, Packet};

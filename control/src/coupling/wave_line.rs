@@ -1,9 +1,9 @@
 //! One direction of a wave line: what carries a wave over a link that delays, jitters and loses, without adding energy.
 //!
-//! A wave u has the power u^2/2. Sent are the wave, its time integral and the integral of its power. The receiver plays the
-//! integral out, so that a lost packet loses no way, and never more energy than has arrived: passive for every delay, jitter and
-//! loss (Niemeyer & Slotine, "Towards force-reflecting teleoperation over the internet", ICRA 1998). With a constant delay and no
-//! loss it is the line of Anderson & Spong 1989: what comes out is what went in, one delay later.
+//! A wave u has the power u^2/2. Sent are the wave, its time integral and the integral of its power. The receiver plays the integral out, so that a
+//! lost packet loses no displacement, and never more energy than has arrived. This is passive for every delay, jitter and loss (Niemeyer & Slotine,
+//! "Towards force-reflecting teleoperation over the internet", ICRA 1998). With a constant delay and no loss it is the line of Anderson & Spong 1989:
+//! what comes out is what went in, one delay later.
 
 use super::side::Packet;
 

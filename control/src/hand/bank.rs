@@ -15,7 +15,7 @@ pub struct HandSettings {
     pub softest: f64,
     /// The firmest; above `softest`.
     pub firmest: f64,
-    /// The gain product mu lambda from which on the loop shakes without a canceller, whichever of these hands holds; `None` where it is not known.
+    /// The lowest gain product mu lambda at which the loop oscillates without a canceller, for any of these hands; `None` where it is not known.
     pub edge_without: Option<f64>,
 }
 

@@ -2,12 +2,12 @@
 
 use super::filter::Steep;
 
-/// Corners of the high-passes through which positions are looked at, Hz. The hand moves on its own accord, which nobody measures, and the more the
-/// slower; a loop that runs away is slow as well.
+/// Corners of the high-passes that filter positions, Hz. The hand also moves by itself, which is not measured, and more at lower frequencies; a loop
+/// that runs away is slow as well.
 const BANDS_HZ: [f64; 2] = [8.0, 25.0];
 /// How the hand moves on its own accord, m/s^3 or rad/s^3: the jerk of a move of 4 mm in 0.15 s or of 10 cm in 0.5 s (Flash & Hogan 1985).
 const INTENT_JERK: f64 = 50.0;
-/// How long the misfit is remembered, s: longer than what tells the hands apart, so that an estimate grows uncertain where nothing moves.
+/// Memory of the misfit, s: longer than the signals that distinguish the hands, so that an estimate grows uncertain where nothing moves.
 const MISFIT_S: f64 = 3.0;
 /// Error of a model that is right, as a share of the motion: errors of a model grow with what it predicts.
 const MODEL_ERROR: f64 = 0.03;
@@ -15,11 +15,11 @@ const MODEL_ERROR: f64 = 0.03;
 const LEAST_NOISE: f64 = 1e-6;
 /// Over which time the motion's power is taken, s.
 const POWER_S: f64 = 0.01;
-/// Errors of a model are alike over this time, s: so many samples count as one.
+/// Correlation time of the errors of a model, s: the samples within it count as one.
 const ALIKE_S: f64 = 0.01;
 /// How long a memory is, s: the short one sees a change soon, the long one is sure.
 const MEMORIES_S: [f64; 2] = [0.03, 0.5];
-/// The long memory is given up for the short one where they differ by so many standard deviations.
+/// The short memory replaces the long one where they differ by this number of standard deviations.
 const CHANGED: f64 = 3.0;
 
 /// What is known of a hand.
@@ -105,7 +105,7 @@ impl Memory {
     }
 }
 
-/// One band of a position and of what the bank says of it.
+/// One band of a position and of the bank's predictions of it.
 #[derive(Debug, Clone)]
 struct Band {
     measured: Steep,
@@ -187,7 +187,7 @@ impl HandEstimator {
         changed
     }
 
-    /// What is known now. What the short memory says beyond its own uncertainty is uncertainty of the long one: a hand may be about to be another.
+    /// What is known now. A deviation of the short memory beyond its own uncertainty counts as uncertainty of the long one: the hand may be changing.
     pub fn estimate(&self) -> Estimate {
         let (now, before) = (self.short.estimate, self.long.estimate);
         let apart = (now.softness - before.softness).powi(2) - now.deviation.powi(2);

@@ -1,8 +1,8 @@
 //! How firmly the hand holds, estimated while the loop runs, and the induced motion that this hand leaves.
 //!
-//! `bank.rs` runs the master's model once for each of several grips, all under the force that is applied; `estimate.rs` says which of them, or what
-//! between two neighbours, moves as the master does, and how surely; `scheduled.rs` predicts the induced motion with no more than is sure of it.
-//! docs/canceller.md derives what share is safe.
+//! `bank.rs` runs the master's model once for each of several grips, all under the force that is applied. `estimate.rs` finds which of them, or which
+//! interpolation between two neighbours, moves as the master does, with its uncertainty. `scheduled.rs` predicts the induced motion with only the
+//! certain part of it. docs/canceller.md derives what share is safe.
 
 mod bank;
 mod estimate;

@@ -7,11 +7,11 @@ use backdrive_msgs::MAX_AXES;
 
 /// An estimate with a relative deviation above this is a guess.
 const GUESS_AT: f64 = 0.1;
-/// By so many times of what a guess exceeds that a hand is taken to be firmer than it is estimated to be.
+/// Conservatism gain: raises the assumed grip stiffness in proportion to the excess relative standard deviation of the estimate.
 const GUESS_COSTS: f64 = 5.0;
 /// Most of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
 const MOST: f64 = 0.97;
-/// What is left over acts as no canceller at this share of the gain that the loop bears without one.
+/// The part that is not cancelled acts as no canceller at this share of the gain that is stable without one.
 const LEFT: f64 = 0.3;
 /// Where it is slow this much of the share is cancelled: what cannot be known at rest is left to the hand, which without a canceller is stable there.
 const SLOW: f64 = 0.5;
@@ -23,18 +23,18 @@ const NO_FORCE: f64 = 0.02;
 const LEAST_FORCE: f64 = 1e-3;
 /// How fast the largest force is forgotten, s.
 const FORCE_MEMORY_S: f64 = 5.0;
-/// Over which time a displacement that is left where no force acts is let go, s.
+/// Time constant with which a remaining displacement decays where no force acts, s.
 const LET_GO_S: f64 = 0.2;
 
-/// A hand is told where its relative deviation is below this.
+/// A hand is reported where its relative deviation is below this.
 const TELLS_AT: f64 = 0.1;
-/// And where it differs from the one told last by more than this, in the logarithm of the firmness.
+/// And where it differs from the last reported one by more than this, in the logarithm of the firmness.
 const TELLS_AFTER: f64 = 0.2;
 
 /// One axis.
 pub(super) struct Axis {
     estimator: HandEstimator,
-    /// What the bank said at the step before.
+    /// Output of the bank at the step before.
     before: Vec<f64>,
     /// Least relative deviation of the estimate since the hand was last seen to have changed.
     surest: f64,
@@ -43,7 +43,7 @@ pub(super) struct Axis {
     /// Its slow part.
     slow: f64,
     largest_force: f64,
-    /// The firmness that was told last, if one was.
+    /// The last reported firmness, if there was one.
     told: Option<f64>,
 }
 
@@ -55,7 +55,7 @@ impl Axis {
         if !self.surest.is_finite() {
             return 0.0;
         }
-        // Where too little moved to tell the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
+        // Where too little moved to identify the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
         estimate.softness * (1.0 - GUESS_COSTS * (self.surest - GUESS_AT).max(0.0))
     }
 }
@@ -75,8 +75,8 @@ pub struct Scheduled {
 }
 
 impl Scheduled {
-    /// Around a bank. `edge_without` is the gain product from which on the loop shakes without a canceller, in the softest and the firmest hand; where it is
-    /// not known as much is cancelled at any gain as a high one needs.
+    /// Around a bank. `edge_without` is the lowest gain product at which the loop oscillates without a canceller, in the softest and the firmest hand. Where
+    /// it is not known, the share that a high gain needs is cancelled at any gain.
     pub fn new(bank: HandBank, edge_without: Option<f64>, period_s: f64) -> Scheduled {
         let hands = bank.softness().len();
         let axis = |axis: usize| Axis {
@@ -94,8 +94,8 @@ impl Scheduled {
         Scheduled { bank, axes, started: false, force_keep, let_go, slow_gain, share: MOST, edge_without }
     }
 
-    /// The gain product now in force, NaN where it is not known. No more is cancelled than it needs: what is left of the motion acts as the whole would at a
-    /// lower gain.
+    /// The gain product now in force, NaN where it is not known. No more is cancelled than it needs: the remaining motion acts as the whole would at a lower
+    /// gain.
     pub fn set_gain(&mut self, gain: f64) {
         if let Some(edge) = self.edge_without.filter(|_| !gain.is_nan()) {
             self.share = (1.0 - LEFT * edge / gain.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
@@ -122,8 +122,8 @@ impl Scheduled {
         self.bank.is_finite()
     }
 
-    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that is
-    /// surely another than the one told last is told in an event.
+    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that
+    /// surely differs from the last reported one is reported in an event.
     pub fn step(&mut self, force: &[f64; MAX_AXES], measured: Option<&[f64; MAX_AXES]>, events: &mut Events) -> [f64; MAX_AXES] {
         let known = self.bank.axes();
         if self.started {

@@ -141,7 +141,7 @@ fn what_is_left_acts_as_no_canceller_far_below_its_edge() {
     for gain in [0.1, 0.6, 1.0, 3.0, 10.0, 100.0] {
         scheduled.set_gain(gain);
         let left = (1.0 - scheduled.share()) * gain;
-        // All of a low gain, of a higher one no more than 0.3 of the edge, of a very high one what is never cancelled.
+        // All of a low gain, of a higher one no more than 0.3 of the critical gain, of a very high one the share that is never cancelled.
         let expected = if gain < 0.6 { gain } else { f64::max(0.6, 0.03 * gain) };
         assert!((left - expected).abs() < 1e-12, "{gain}: {left}");
     }

@@ -1,8 +1,8 @@
-//! Where the edge of the running loop is, as it is told.
+//! The reported stability limit of the running loop.
 
 use backdrive_msgs::margin;
 
-/// Where the edge of the running loop is, as the gain of the force at the present position scale.
+/// The stability limit of the running loop, as the gain of the force at the present position scale.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Edge {
     /// Nothing is touched, or not for a whole window.
@@ -12,7 +12,7 @@ pub enum Edge {
     Settling,
     /// In contact, but too many contact forces come late or not at all for a whole window.
     Late,
-    /// In contact, and no edge is below this lambda; where it is is not known.
+    /// In contact, and the critical gain is above this lambda; its value is not known.
     Above {
         /// Force scale, no unit.
         lambda: f64,
@@ -28,10 +28,10 @@ pub enum Edge {
     },
 }
 
-/// What a core tells of the loop's margin; the fields of [`backdrive_msgs::Margin`] that are its own.
+/// A core's report on the loop's margin; the fields of [`backdrive_msgs::Margin`] that are its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Told {
-    /// The axis that is nearest to its edge, from 0.
+    /// The axis that is nearest to its stability limit, from 0.
     pub axis: u32,
     /// One of [`backdrive_msgs::margin`].
     pub known: u32,
@@ -48,7 +48,7 @@ pub struct Told {
 }
 
 impl Told {
-    /// What is told of an axis at the scales now in force. Without a dither `edge` is `None`.
+    /// The report on an axis at the scales now in force. Without a dither there is no stability limit: `edge` is `None`.
     pub fn of(axis: usize, edge: Option<Edge>, mu: f64, lambda: f64, ring: Option<f64>) -> Told {
         let (known, factor, deviation, frequency_hz) = match edge {
             None => (margin::NO_DITHER, f64::NAN, f64::NAN, f64::NAN),
@@ -58,7 +58,7 @@ impl Told {
             Some(Edge::At { lambda: edge, deviation, frequency_hz }) if lambda > 0.0 => {
                 (margin::KNOWN, edge / lambda, deviation, frequency_hz)
             }
-            // A bound below the gain that is in force says nothing.
+            // A bound below the gain that is in force is no information.
             Some(Edge::Above { lambda: edge }) if lambda > 0.0 && edge > lambda => (margin::ABOVE, edge / lambda, f64::NAN, f64::NAN),
             Some(_) => (margin::NOISY, f64::NAN, f64::NAN, f64::NAN),
         };

@@ -1,4 +1,4 @@
-//! An axis's edge from the newest windows.
+//! An axis's stability limit from the newest windows.
 
 use super::edge::Edge;
 use super::lines::{DITHER, FELT, Lines, MAX_LINES, SENT, Taken, Window};
@@ -31,7 +31,7 @@ const BAND_HZ: [f64; 2] = [6.5, 250.0];
 /// Distance of neighbouring lines: a window's resolution, and this share of the frequency where that is more.
 const SPACING: f64 = 0.085;
 
-/// The hand may drown lines up to here, Hz, without the edge that the others show being kept back.
+/// The hand may mask lines up to here, Hz; the limit that the other lines show is reported nevertheless.
 const HAND_HZ: f64 = 16.0;
 
 /// Standard deviation of a known line, as a share of its magnitude, at most.
@@ -46,7 +46,7 @@ const FREE_STEPS: u32 = 3;
 /// Scatter of one window's answer, as a share of it, that leakage leaves even without noise (found in the tests here).
 const LEAST_SCATTER: f64 = 0.15;
 
-/// Estimates the edge of one axis of the running loop. A step costs the same whatever is estimated and allocates nothing.
+/// Estimates the stability limit of one axis of the running loop. A step costs the same whatever is estimated and allocates nothing.
 #[derive(Debug, Clone)]
 pub struct LiveMargin {
     count: usize,
@@ -171,9 +171,9 @@ impl LiveMargin {
         held
     }
 
-    /// One step: the dither, the force sent, which holds it, and the contact force felt of which it is made, N or N m;
-    /// `None` for one that has not come. `mu` is the position scale now: the edge is that of one position scale, so a
-    /// change begins anew. Says whether [`LiveMargin::edge`] is new.
+    /// One step: the dither, the force sent, which holds it, and the contact force felt of which it is made, N or N m; `None` for one that has not
+    /// come. `mu` is the position scale now: the critical gain is that of one position scale, so a change restarts the estimate. Returns whether
+    /// [`LiveMargin::edge`] is new.
     pub fn step(&mut self, dither: f64, sent: f64, felt: Option<f64>, mu: f64) -> bool {
         if mu != self.mu {
             self.mu = mu;
@@ -290,7 +290,7 @@ impl LiveMargin {
         let bound = if most > 0.0 { Edge::Above { lambda: 1.0 / most } } else { Edge::Free };
         let hz = &self.hz[..self.count];
         let Some(edge) = critical_factor(hz, &response[..self.count]) else { return bound };
-        // The lines that it was read from must be neighbours, and no line that is not known may hide a nearer edge.
+        // The lines that the limit was read from must be neighbours, and no unknown line may hide a lower one.
         let above = hz.iter().position(|f| *f > edge.frequency_hz).unwrap_or(self.count - 1).max(1);
         let (lower, upper) = (above - 1, above);
         let hidden = (0..self.count).any(|i| !known[i] && hz[i] > HAND_HZ && (all[i].norm() + 2.0 * deviation[i]) * edge.factor > 1.0);

@@ -11,8 +11,8 @@ pub(crate) const CORNER_HZ: f64 = 8.0;
 /// Windows over which a ring-down must hold.
 const RING_WINDOWS: usize = 4;
 
-/// How fast the part of a force above 8 Hz dies: the slope of the logarithm of its RMS over four windows of 50 ms, where it falls (or
-/// rises) from each to the next by about as much. It is what an oscillation did, not how far the edge is.
+/// Decay rate of the part of a force above 8 Hz: the slope of the logarithm of its RMS over four windows of 50 ms. It is given where the RMS falls
+/// (or rises) from each window to the next by about as much. It describes an oscillation, not the stability margin.
 #[derive(Debug, Clone)]
 pub struct RingDown {
     smoothing: f64,
@@ -29,7 +29,7 @@ pub struct RingDown {
 }
 
 impl RingDown {
-    /// What is below `least_force` RMS, N or N m, is not looked at.
+    /// A force below `least_force` RMS, N or N m, is not evaluated.
     pub fn new(least_force: f64, period_s: f64) -> RingDown {
         let window = ((RING_WINDOW_S / period_s).round() as u32).max(4);
         RingDown {

@@ -1,4 +1,4 @@
-//! Loops whose edge is known.
+//! Loops whose critical gain is known.
 
 use super::*;
 use crate::margins::critical_factor;
@@ -64,7 +64,7 @@ impl Loop {
         -WALL * ((z - d) * self.b[0] + self.b[1] * b) / det / z.powi(DELAY as i32 - 1)
     }
 
-    /// The first edge of the loop, by a fine search.
+    /// The first stability limit of the loop, by a fine search.
     fn edge(&self) -> (f64, f64) {
         let hz: Vec<f64> = (1..8000).map(|i| 0.05 * f64::from(i)).collect();
         let l: Vec<_> = hz.iter().map(|f| self.response(*f)).collect();
@@ -171,7 +171,7 @@ fn free_motion_and_the_hand_alone_tell_nothing() {
         live.step(d, d + 0.5 * felt, Some(felt), 1.0);
         assert_eq!(live.edge(), Edge::Free, "sensor noise is no contact");
     }
-    // A hand that shakes at a wall that does not give way to the dither: no edge may be told.
+    // A hand that shakes at a wall that does not yield to the dither: no stability limit may be reported.
     for k in 0..20_000 {
         let d = dither[k % dither.len()];
         let felt = -1.0 + 0.2 * (TAU * 9.0 * k as f64 * PERIOD).sin() + 0.05 * noise.next();
@@ -207,7 +207,7 @@ fn a_lost_contact_or_another_position_scale_begins_anew() {
     assert_eq!(live.edge(), Edge::Free);
 }
 
-/// The loop at half of its edge, of whose contact forces some do not come: then nothing is sent, and the master holds the last force.
+/// The loop at half of its critical gain, with some contact forces missing: then nothing is sent, and the master holds the last force.
 fn with_gaps(seconds: f64, comes: impl Fn(usize) -> bool) -> (f64, Vec<Edge>) {
     let (edge, _) = Loop::new().edge();
     let dither = multisine(1.0, 500.0, 0.05);
@@ -242,7 +242,7 @@ fn a_gap_keeps_the_windows_before_it_and_many_gaps_are_told() {
     let (_, told) = with_gaps(8.0, |k| (k as f64 * PERIOD) % 3.0 > 0.05);
     let first = told.iter().position(|edge| matches!(edge, Edge::At { .. })).unwrap();
     assert!(told[first..].iter().all(|edge| matches!(edge, Edge::At { .. } | Edge::Above { .. })), "{told:?}");
-    // One every 0.4 s: no window comes to its end, and that is what is told.
+    // One every 0.4 s: no window is completed, and that is reported.
     let (_, told) = with_gaps(8.0, |k| (k as f64 * PERIOD) % 0.4 > 0.05);
     assert_eq!(told, [Edge::Late]);
 }

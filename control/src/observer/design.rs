@@ -159,8 +159,8 @@ fn split(system: &System, gains: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 /// mild one), so `back_off` lies above 1. What is found is checked against the inequality itself by eigenvalues.
 ///
 /// # Errors
-/// When a weight or noise is not above 0, the back-off is not above 1, what is measured does not tell the unknown force, or numbers so far
-/// apart that the result does not satisfy the inequality.
+/// When a weight or noise is not above 0, the back-off is not above 1, the measured signals do not determine the unknown force, or parameters are so
+/// different in size that the result does not satisfy the inequality.
 pub fn design(system: &System, weights: &Weights, back_off: f64) -> Result<Design, DesignError> {
     if !(back_off.is_finite() && back_off > 1.0) {
         return Err(DesignError::BackOff(back_off));

@@ -3,7 +3,7 @@
 use crate::engine::Engine;
 use nalgebra::{SMatrix, SVector};
 
-/// Twist, w_C, w_A, T_C, and what the engine's map is wrong by, N m.
+/// Twist, w_C, w_A, T_C, and the error of the engine's map, N m.
 const STATES: usize = 5;
 
 /// The shaft of Blumenschein et al., eq (1).
@@ -19,7 +19,7 @@ pub struct Shaft {
     pub damping: f64,
 }
 
-/// The filter: the shaft driven by a Hammerstein engine whose map is wrong by a torque that walks at random.
+/// The filter: the shaft driven by a Hammerstein engine whose map has an error torque that is a random walk.
 ///
 /// The observer needs the engine's inertia alone; this one its map, its lag and the pedal too.
 #[derive(Debug, Clone)]

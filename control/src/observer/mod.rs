@@ -1,4 +1,4 @@
-//! The proportional-integral observer with an unknown input: it estimates a force or torque that nobody measures, from measured motion.
+//! The proportional-integral observer with an unknown input: it estimates an unmeasured force or torque from measured motion.
 //!
 //! Of an engine test bench it estimates the engine's torque (Blumenschein et al. 2013, Section II-B); of a master, the force of the user's hand.
 //! [`System`] is eq (2), [`design()`] finds the gains of eq (3) by the Riccati form of the matrix inequality (6), [`lmi`] checks them against that

@@ -7,8 +7,8 @@ const MOST_STEPS: usize = 100;
 
 /// The stabilising solution X = X' of `F X + X F' + Q - X W X = 0`, Q and W symmetric; `None` where there is none.
 ///
-/// The sign function of the Hamiltonian matrix [[F', -W], [-Q, -F]] (Roberts 1980), by Newton's iteration scaled with the determinant (Byers
-/// 1987), gives its stable subspace; a step of Newton's method on the equation itself then takes off what rounding left.
+/// The sign function of the Hamiltonian matrix [[F', -W], [-Q, -F]] (Roberts 1980) gives its stable subspace. It is computed by Newton's iteration
+/// scaled with the determinant (Byers 1987). A step of Newton's method on the equation itself then removes the rounding error.
 pub fn solve(f: &DMatrix<f64>, q: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = f.nrows();
     let mut h = DMatrix::zeros(2 * n, 2 * n);
@@ -77,7 +77,7 @@ fn sign(mut z: DMatrix<f64>) -> Option<DMatrix<f64>> {
             return Some(z);
         }
     }
-    // On the edge of existence eigenvalues lie on the imaginary axis, where the sign is not defined.
+    // At the limit of existence eigenvalues lie on the imaginary axis, where the sign is not defined.
     ((&z * &z - DMatrix::identity(z.nrows(), z.nrows())).norm() < 1e-6).then_some(z)
 }
 

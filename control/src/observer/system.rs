@@ -19,7 +19,7 @@ pub struct System {
     pub noise: Vec<f64>,
     /// Velocity of the bodies on which the unknown inputs act, by states.
     pub user_velocity: DMatrix<f64>,
-    /// Their position by states; `None` where speeds alone are measured, which do not tell it.
+    /// Their position by states; `None` where speeds alone are measured, which do not determine it.
     pub user_position: Option<DMatrix<f64>>,
 }
 
@@ -55,7 +55,7 @@ pub enum SystemError {
         /// How many there have to be.
         needed: usize,
     },
-    /// What is measured does not tell the unknown force.
+    /// The measured signals do not determine the unknown force.
     #[error("what is measured does not determine the unknown force: {rank} of {states} states can be told from it")]
     Unobservable {
         /// Rank of the observability matrix.
@@ -192,7 +192,7 @@ impl System {
         (a, c)
     }
 
-    /// Whether states and unknown inputs can be told from what is measured (rank of the observability matrix, time and columns scaled).
+    /// Whether states and unknown inputs can be determined from the measured signals (rank of the observability matrix, time and columns scaled).
     ///
     /// # Errors
     /// [`SystemError::Unobservable`] where they cannot.

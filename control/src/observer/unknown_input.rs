@@ -152,11 +152,11 @@ impl UnknownInput {
     }
 }
 
-/// Inputs `measured` (motion where the known force acts; its effort is that force), `user` (motion where the unknown force acts), `force` (the
-/// known force, in place of the effort of `measured`); outputs `estimate` (motion where the unknown force acts, effort = that force),
-/// `filtered` (effort = that force behind a Butterworth filter).
+/// Inputs: `measured` (motion where the known force acts; its effort is that force), `user` (motion where the unknown force acts), `force` (the known
+/// force, instead of the effort of `measured`). Outputs: `estimate` (motion where the unknown force acts, effort = that force), `filtered` (effort =
+/// that force behind a Butterworth filter).
 ///
-/// The effort of a sample holds until the next one. A sample that carries no measurement lets the model run on, and nothing is told.
+/// The effort of a sample holds until the next one. At a sample without a measurement the model runs on, and nothing is put out.
 pub struct ObserverNode {
     observer: UnknownInput,
     filters: Vec<Butterworth>,
@@ -169,8 +169,8 @@ pub struct ObserverNode {
 }
 
 impl ObserverNode {
-    /// `velocity` says of `measured` and `user` whether it is their velocity that is measured (else their position), `None` for a `user` that is
-    /// not there; `force_port` whether `force` is. A filter of 0 Hz lets everything pass.
+    /// `velocity` states for `measured` and `user` whether their velocity is measured (else their position), `None` for a `user` that is not there;
+    /// `force_port` states whether `force` is. A filter of 0 Hz lets everything pass.
     pub fn new(observer: UnknownInput, velocity: [Option<bool>; 2], force_port: bool, filter: (usize, f64), period_s: f64) -> ObserverNode {
         let filters = vec![Butterworth::new(filter.0, filter.1, period_s); observer.unknown()];
         ObserverNode { observer, filters, velocity, force_port, fresh: Default::default(), known: [0.0; MAX_AXES], was_finite: true }

@@ -5,7 +5,7 @@ use backdrive_plant::elements::{Coulomb, Law, Role, Stribeck};
 use backdrive_plant::model::{Model, Motion};
 use backdrive_plant::robot::JointKind;
 
-/// Width of the smooth sign, m/s or rad/s, where nothing else is said; see [`width_for`].
+/// Width of the smooth sign, m/s or rad/s, by default; see [`width_for`].
 const WIDTH: [f64; 2] = [1e-3, 1e-2];
 /// The smooth sign is at most this share of the speed within which friction falls or rises.
 const SHARE_OF_STRIBECK: f64 = 0.2;

@@ -8,7 +8,7 @@ fn text(value: &str) -> String {
     serde_json::Value::from(value).to_string()
 }
 
-/// What a term is called, its equation and its numbers.
+/// The name of a term, its equation and its parameters.
 fn parts(term: &Term) -> (&'static str, &'static str, Vec<(&'static str, f64)>) {
     match *term {
         Term::Coulomb { positive, negative } => {

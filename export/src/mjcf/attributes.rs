@@ -15,8 +15,8 @@ pub(super) struct Integration {
 }
 
 impl Integration {
-    /// Attributes that hold dry friction as close to set-valued as MuJoCo's constraints allow: a sticking joint of mass m that holds a force f creeps with about
-    /// f (1 - d)/d T/(2 m), with the impedance d at most 0.9999 and the time constant T at least two steps.
+    /// Attributes that hold dry friction as close to set-valued as MuJoCo's constraints allow. A sticking joint of mass m that holds a force f creeps with
+    /// about f (1 - d)/d T/(2 m). The impedance d is at most 0.9999, and the time constant T at least two steps.
     pub(super) fn friction(self) -> [(&'static str, String); 2] {
         [("solreffriction", format!("{} 1", number(2.0 * self.step))), ("solimpfriction", "0.9999 0.9999 0.001 0.5 2".to_owned())]
     }
@@ -45,8 +45,7 @@ pub(super) fn of_joint(joint: &OnJoint, angle: f64, integration: Integration) ->
     all
 }
 
-/// Attributes as text, each with a space before it.
-/// Whether an arm's file is an MJCF, which is patched; a URDF is written anew.
+/// Attributes as text, each with a space before it. Whether an arm's file is an MJCF, which is patched; a new URDF is written.
 pub(super) fn is_mjcf(arm: &Arm) -> bool {
     roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("mujoco"))
 }

@@ -88,7 +88,7 @@ pub(super) fn next_to_nothing(layout: &Layout, network: &Network, integration: I
     all + &closed
 }
 
-/// The bodies of a robot, from its description. A base of the name `world` is MuJoCo's own; what else had to change is told in `notes`.
+/// The bodies of a robot, from its description. A base of the name `world` is MuJoCo's own; other necessary changes are reported in `notes`.
 pub(super) fn of_robot(robot: &Robot, layout: &Layout, network: &Network, integration: Integration, notes: &mut Vec<String>) -> String {
     let mut taken: BTreeSet<String> = robot.links.iter().map(|link| link.name.clone()).chain([WORLD.to_owned()]).collect();
     let mut named = |link: &Link| if link.name == WORLD { unlike(WORLD.to_owned(), &mut taken) } else { link.name.clone() };

@@ -1,7 +1,7 @@
 //! A network's elements as what MuJoCo has on joints, as tendons and as constant forces.
 //!
-//! Every body of the network is a joint whose coordinate is the body's position, so an element between a body and ground is the joint's, and one between two
-//! bodies a fixed tendon whose length is the difference of two coordinates.
+//! Every body of the network is a joint whose coordinate is the body's position. An element between a body and ground is therefore the joint's, and one
+//! between two bodies is a fixed tendon whose length is the difference of two coordinates.
 
 use super::passive::{Passive, exactly, nearest};
 use crate::left_out::LeftOut;
@@ -77,7 +77,7 @@ pub(super) fn network(model: &Model, pose: &[f64], names: BTreeSet<String>) -> (
         }
     }
     for input in model.inputs.iter().filter(|i| i.kind == InputKind::Force && i.back_emf != 0.0) {
-        // It cannot be told from a damper.
+        // It is equivalent to a damper.
         if let Some(joint) = network.joints.get_mut(input.on) {
             joint.damping[0] += input.back_emf;
         }

@@ -1,4 +1,4 @@
-//! An MJCF file with what its joints are now, and everything else as it was.
+//! An MJCF file with the present joints, and everything else unchanged.
 
 use super::attributes::{Integration, of_joint};
 use super::bodies::on_joint;
@@ -18,7 +18,7 @@ pub(super) struct Sections {
     pub others: String,
 }
 
-/// The robot's file with the joints of the network, and `sections` at its end. What had to be taken out is told in `notes`.
+/// The robot's file with the joints of the network, and `sections` at its end. What had to be removed is reported in `notes`.
 ///
 /// # Errors
 /// Where the file is not the one that the robot was read from.
@@ -73,7 +73,7 @@ pub(super) fn patched(
     Ok(edits.done(xml))
 }
 
-/// Whether the file says the same already.
+/// Whether the file has the same value already.
 fn is_there(joint: &Joint, on: &OnJoint, attribute: &str) -> bool {
     let linear = |all: &[f64; 3], first: f64| *all == [first, 0.0, 0.0];
     match attribute {

@@ -82,14 +82,14 @@ fn actuator(model: &Model, index: usize, input: &Input, joint: &str, integration
     text + "/>\n"
 }
 
-/// What the robot file says of a body that is a joint of the robot.
+/// The robot file's limits of a body that is a joint of the robot.
 fn limits_of(model: &Model, body: usize) -> Option<Limits> {
     let arm = model.arm.as_ref()?;
     let coordinate = arm.tree.coordinates().get(arm.bodies.iter().position(|b| *b == body)?)?;
     Some(arm.robot.joints.get(coordinate.joint)?.limits)
 }
 
-/// What the axis says of its motor, N or N m.
+/// The axis's limit of its motor, N or N m.
 fn force_limit(model: &Model, input: usize) -> Option<f64> {
     model.axes.iter().filter(|axis| axis.feedback == input).find_map(|axis| axis.force)
 }

@@ -1,4 +1,4 @@
-//! A URDF with what its links weigh now, and everything else as it was.
+//! A URDF with the present masses and inertias of its links, and everything else unchanged.
 
 use super::write::inertial;
 use crate::ExportError;

@@ -54,8 +54,8 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
     Ok(Exported { text, left_out, notes })
 }
 
-/// A robot's links and joints as a new URDF: read again it is the same robot, but for what a URDF has no word for (armature, springs, and a reference of a
-/// joint, from which coordinates then count).
+/// A robot's links and joints as a new URDF. Read again it is the same robot, except for what a URDF has no word for: armature, springs, and a reference
+/// of a joint, from which coordinates then count.
 pub fn robot_as_urdf(robot: &Robot) -> String {
     write::alone(robot)
 }

@@ -1,4 +1,4 @@
-//! A URDF with what its joints are now, and everything else as it was.
+//! A URDF with the present joints, and everything else unchanged.
 
 use super::write::UNSAID;
 use crate::ExportError;

@@ -121,8 +121,8 @@ fn dynamics(joint: &Joint, terms: JointTerms, unsaid: &mut bool) -> String {
     )
 }
 
-/// Turns about the fixed x, y and z axes, rad. The yaw is taken first and turned back, so that the three make the same rotation to rounding where the pitch is
-/// near ±90° too, and roll and yaw are not determined each by itself.
+/// Turns about the fixed x, y and z axes, rad. The yaw is taken first and turned back, so that the three make the same rotation to rounding also where the
+/// pitch is near ±90°. Roll and yaw are then not determined individually.
 fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
     let yaw = r[(1, 0)].atan2(r[(0, 0)]);
     let (sin, cos) = yaw.sin_cos();

@@ -5,7 +5,7 @@ use crate::finding::{Finding, FindingKind, Weight};
 use crate::recording::Recording;
 use backdrive_bags::{ClockFaultKind, clock_faults};
 
-/// Least size of a gap, in usual steps and in seconds. A shorter jump is a late sample, and its time says so.
+/// Least size of a gap, in usual steps and in seconds. A shorter jump is a late sample, which is visible in its time.
 const GAP_STEPS: f64 = 5.0;
 const GAP_S: f64 = 0.05;
 

@@ -36,7 +36,7 @@ const NOISIER: f64 = 1.5;
 const SAME: f64 = 0.99;
 /// What names and units say is this sure at least.
 const NAMED: f64 = 0.8;
-/// Share of variance from which on columns are said to be exchanged.
+/// Share of variance above which columns are reported as exchanged.
 const ALL_BUT: f64 = 0.97;
 
 /// Finds what is wrong.

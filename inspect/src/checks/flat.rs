@@ -17,7 +17,7 @@ const JUMP: f64 = 5.0;
 const PARTNER_MOVES: f64 = 0.2;
 /// Share of its range by which a partner has to move in the stretch.
 const MOVES: f64 = 0.005;
-/// Share of equal neighbours above which a signal stands still as a rule, and nothing is said of stretches.
+/// Share of equal neighbours above which a signal stands still as a rule, and stretches are not reported.
 const OFTEN_EQUAL: f64 = 0.25;
 
 /// Finds them.
@@ -131,7 +131,7 @@ fn joint_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, fr
     })
 }
 
-/// Whether what goes with a signal moved on while it stood: of a position its command, of a command its position.
+/// Whether the partner of a signal moved on while it stood: of a position its command, of a command its position.
 fn partner_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, from: usize, to: usize, jump: f64) -> bool {
     let partner = match signal.quantity {
         Quantity::Position => joint.and_then(|joint| joint.command),

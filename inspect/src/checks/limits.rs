@@ -164,7 +164,7 @@ fn quantised(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<F
     let Some(step) = noise::step_of(&signal.values) else { return };
     let levels = width(&signal.values) / step;
     let limit = if signal.quantity.is_drive() { COARSE_DRIVE } else { COARSE };
-    // A joint that is told to stand still, or a motion of one or two steps, needs no finer sensor.
+    // A joint that is commanded to stand still, or a motion of one or two steps, needs no finer sensor.
     let asked = joint.command.filter(|_| !joint.is_led).map_or(f64::INFINITY, |place| span(&recording.signals[place].even));
     if levels < 3.0 || levels >= limit || asked < 3.0 * step * signal.factor().abs() {
         return;

@@ -8,7 +8,7 @@ use crate::recording::{Recording, Signal};
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// A repeated stretch has at least so many rows, all different from the row before.
+/// A repeated stretch has at least this number of rows, all different from the row before.
 const LEAST_ROWS: usize = 8;
 /// Values that change in it, over all columns: one slow column may pass a place twice alike.
 const LEAST_CHANGES: usize = 22;

@@ -68,7 +68,7 @@ fn low_passed(values: &[f64], period: f64) -> Option<f64> {
         part.iter().sum::<f64>() / part.len().max(1) as f64
     };
     let (middle, top) = (mean(0.25, 0.5), mean(0.75, 1.0));
-    // Rounding leaves a floor: what is at it throughout says nothing.
+    // Rounding leaves a noise floor: a spectrum that is at it throughout is no evidence.
     let whole = density.iter().copied().fold(0.0, f64::max);
     (top > 0.0 && top < QUIET * middle && middle > 1e-12 * whole).then(|| hz.get(density.len() / 4).copied()).flatten()
 }

@@ -8,7 +8,7 @@ use crate::numeric::{median, robust_deviation, span};
 use crate::recording::Recording;
 use std::collections::BTreeMap;
 
-/// Pieces of a recording over which its offset is looked at.
+/// Pieces of a recording over which its offset is evaluated.
 const PIECES: usize = 10;
 /// A zero is shifted where it is beyond the largest deviation within a recording by this factor, and beyond this share of the joint's range.
 const DEVIATIONS: f64 = 2.0;

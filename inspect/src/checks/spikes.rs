@@ -5,12 +5,12 @@ use crate::numeric::{extremes, median, quantile};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 
-/// A position is an outlier from so many usual deviations from its neighbours on, and this share of its range: a mass does not jump and come back within
-/// two samples.
+/// A position is an outlier above this number of usual deviations from its neighbours, and this share of its range: a mass does not jump and come back
+/// within two samples.
 const OF_POSITION: [f64; 2] = [20.0, 0.08];
 /// Another signal is one where it leaves the range of all other samples by this share of it.
 const BEYOND: f64 = 0.5;
-/// It is so many usual steps away at least: a count of a sensor is no outlier.
+/// It is at least this number of usual steps away: a count of a sensor is no outlier.
 const STEPS: f64 = 4.0;
 /// Outliers are few: beyond this share of the samples the signal is like that.
 const FEW: f64 = 0.01;

@@ -41,7 +41,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let Some(place) = joint.position.filter(|_| arm) else { continue };
         let signal = &recording.signals[place];
         let says_unit = signal.stated.or(signal.hint).is_some();
-        // A command in the same unit makes no difference visible: the range alone says it.
+        // A command in the same unit makes no difference visible: the range alone shows it.
         if signal.quantity == Quantity::Position && !says_unit && span(&signal.even) > TURNS {
             let turns = span(&signal.even) / std::f64::consts::TAU;
             let message = format!("{:?} runs over {turns:.1} turns if it is in radians: it looks like degrees", signal.name);

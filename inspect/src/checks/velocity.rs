@@ -17,7 +17,7 @@ const NEAR: f64 = 0.04;
 const UNSURE_S: f64 = 0.012;
 /// Of exchanged columns the factor is this near to 1.
 const EXCHANGED: f64 = 0.12;
-/// Columns are exchanged where the rest is smaller by this factor the other way round.
+/// Columns are exchanged where the residual is smaller by this factor with exchanged columns.
 const BETTER: f64 = 0.3;
 /// Finds what is wrong.
 pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {

@@ -9,7 +9,7 @@ const COHERENT: f64 = 0.7;
 /// Length of a segment, s, at most; and the fewest of them in a recording.
 const SEGMENT_S: f64 = 8.0;
 const SEGMENTS: usize = 4;
-/// Highest frequency that is looked at, Hz: servos of joints are below it.
+/// Highest frequency that is evaluated, Hz: servos of joints are below it.
 const HIGHEST_HZ: f64 = 60.0;
 /// -3 dB.
 const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use backdrive_diagnosis::follow::student;
 use backdrive_diagnosis::noise;
 
-/// A command is held where it stays within this share of its range, for at least so many seconds and lags.
+/// A command is held where it stays within this share of its range, for at least this number of seconds and lags.
 const STILL: f64 = 2e-3;
 const LEAST_S: f64 = 0.5;
 const LEAST_LAGS: f64 = 3.0;
@@ -15,7 +15,7 @@ const LEAST_LAGS: f64 = 3.0;
 const TAIL: f64 = 0.3;
 /// A position has settled where it varies by less than this share of the command's range in the tail.
 const SETTLED: f64 = 0.01;
-/// A step is at least this share of the range, within so many samples.
+/// A step is at least this share of the range, within this number of samples.
 const STEP: f64 = 0.1;
 /// Fewest holds from either side for a dead band, and fewest steps for an overshoot.
 const LEAST_HOLDS: usize = 3;
@@ -32,7 +32,7 @@ pub struct Steady {
     pub dead_band: Option<Interval>,
 }
 
-/// Looks at every hold of the command; `lag` in samples.
+/// Evaluates every hold of the command; `lag` in samples.
 pub fn steady(recording: &Recording, joint: &Joint, u: &[f64], y: &[f64], lag: f64) -> Steady {
     let (range, period) = (span(u), recording.period);
     let least = ((LEAST_S / period).max(LEAST_LAGS * lag) as usize).max(8);
@@ -49,7 +49,7 @@ pub fn steady(recording: &Recording, joint: &Joint, u: &[f64], y: &[f64], lag: f
                 let level = mean(&u[from..to]);
                 let error = mean(tail) - level;
                 errors.push(error);
-                // The command before the hold says from which side it was approached.
+                // The command before the hold shows from which side it was approached.
                 let before = from.checked_sub(((0.3 / period) as usize).max(2)).map(|place| u[place]);
                 match before {
                     Some(before) if before > level + 4.0 * STILL * range => above.push(error),

@@ -248,7 +248,7 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
         "sign" | "scale" => {
             let place = pick(random, &columns, &[Role::Position, Role::Drive])?;
             let is_drive = columns[place].role == Role::Drive;
-            // The scale of a torque is nobody's to know without a model.
+            // The scale of a torque cannot be known without a model.
             (!is_drive || name == "sign").then_some(())?;
             let joint = columns[place].joint;
             (is_drive || of_joint(&columns, joint, Role::Command).or(of_joint(&columns, joint, Role::Velocity)).is_some()).then_some(())?;

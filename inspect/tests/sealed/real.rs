@@ -4,7 +4,7 @@ use super::draw::{Clean, Column, Role};
 use backdrive_bags::{ImportOptions, raw_table};
 use std::path::Path;
 
-/// Where recordings of real devices are, which are not part of the project: beside it, or where `BACKDRIVE_DATA` says.
+/// Where recordings of real devices are, which are not part of the project: beside it, or in `BACKDRIVE_DATA`.
 fn folder() -> std::path::PathBuf {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     std::env::var_os("BACKDRIVE_DATA").map_or(beside, Into::into)

@@ -1,4 +1,4 @@
-//! Which hosts are missing, and why, as far as this one can tell.
+//! Which hosts are missing, and why, to the knowledge of this one.
 
 use super::{ENOUGH, Here, Round, There};
 use backdrive_nodes::transport::ros2::interfaces;

@@ -1,8 +1,8 @@
 //! The clock of another host, from round trips that are timed on this one.
 //!
-//! A question leaves at `a` and its answer, which holds the other's clock `b`, is here at `c`: the other's clock is ahead
-//! by `b - (a + c) / 2`, and wrong by at most `(c - a) / 2`, whichever way took longer (Cristian 1989). Of the last
-//! round trips the shortest is believed, with what two clocks may have drifted since.
+//! A question leaves at `a` and its answer, which holds the other's clock `b`, is here at `c`. The other's clock is ahead by `b - (a + c) / 2`, with
+//! an error of at most `(c - a) / 2`, whichever way took longer (Cristian 1989). Of the last round trips the shortest is believed, with what two
+//! clocks may have drifted since.
 
 use backdrive_bags::ClockOffset;
 use nix::time::{ClockId, clock_gettime};

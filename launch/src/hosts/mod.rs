@@ -1,8 +1,8 @@
-//! A run on several hosts: the supervisors find each other, start together, and tell what becomes of the others.
+//! A run on several hosts: the supervisors find each other, start together, and report the state of the others.
 //!
-//! They know each other by a secret that they share, and tell their nodes whose messages to take. They talk on one topic, each says twice a second how it is, and each measures the others' clocks. The first host of
-//! the graph says when step 0 is due, in each host's own clock. A host that is started again, or late, is told when step
-//! 0 was by one that runs, and joins at the step that is due.
+//! They know each other by a secret that they share, and inform their nodes whose messages to take. They talk on one topic, each reports its state twice a
+//! second, and each measures the others' clocks. The first host of the graph announces when step 0 is due, in each host's own clock. A host that is restarted,
+//! or late, learns from a running one when step 0 was, and joins at the step that is due.
 
 mod absent;
 mod clocks;
@@ -38,7 +38,7 @@ const TOPIC: &str = "/backdrive/hosts";
 /// Below every node.
 const PRIORITY: i32 = 30;
 
-/// How often a host says how it is.
+/// How often a host reports its state.
 const HELLO_EVERY: Duration = Duration::from_millis(200);
 
 /// A host that is not heard for this long is lost.
@@ -47,7 +47,7 @@ const LOST_AFTER: Duration = Duration::from_millis(1000);
 /// How often a clock is measured: at first, and when it is known.
 const PING_EVERY: [Duration; 2] = [Duration::from_millis(20), Duration::from_millis(250)];
 
-/// How often a measured clock is told.
+/// How often a measured clock is reported.
 const TELL_CLOCK_EVERY: Duration = Duration::from_secs(1);
 
 /// Time between the word to start and step 0: every host and its nodes have heard it by then.
@@ -56,7 +56,7 @@ const LEAD_NS: i64 = 700_000_000;
 /// Round trips before a clock counts as measured.
 const ENOUGH: usize = 10;
 
-/// What a supervisor says of itself.
+/// A supervisor's report on itself.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Here {
     /// All its nodes are connected.
@@ -75,7 +75,7 @@ pub(crate) struct Here {
 pub(crate) enum There {
     /// Step 0 is due.
     Start(Begun),
-    /// Who is missing, and why; empty when nobody is.
+    /// Who is missing, and why; empty when all are there.
     Missing(Vec<String>),
     /// Something that a person should know.
     Event(u32, &'static str, String),
@@ -120,7 +120,7 @@ impl Hosts {
         }
     }
 
-    /// Says how this host is.
+    /// Reports the state of this host.
     pub fn tell(&self, change: impl FnOnce(&mut Here)) {
         change(&mut self.here.lock().unwrap_or_else(PoisonError::into_inner));
     }
@@ -284,14 +284,14 @@ impl Round {
         });
     }
 
-    /// Said so that a person knows; nothing of it is heard.
+    /// Reported so that a person knows; nothing of it is accepted.
     fn hear_foreign(&mut self) {
         if !std::mem::replace(&mut self.foreign, true) {
             self.event(1, "host_secret", "somebody who does not have this run's secret speaks as a host; it is not heard");
         }
     }
 
-    /// Takes this speaker for the host, and tells the nodes whose messages are the host's.
+    /// Takes this speaker for the host, and informs the nodes whose messages are the host's.
     fn take_for(&mut self, host: &str, speaker: &Speaker) {
         if let Some(other) = self.others.get_mut(host) {
             other.speaker = Some(speaker.clone());
@@ -383,7 +383,7 @@ impl Round {
         }
     }
 
-    /// Asks the others for their clocks, and tells what they are.
+    /// Asks the others for their clocks, and reports the result.
     fn measure(&mut self) {
         let mut told = Vec::new();
         for (host, other) in &mut self.others {
@@ -422,7 +422,7 @@ impl Round {
         if leads && me_ready && self.begun.is_none() && self.others.values().all(|o| o.ready && o.clocks.len() >= ENOUGH) {
             self.start(Begun { t0_ns: monotonic_ns() + LEAD_NS, unix_ns: unix_ns() + LEAD_NS });
         }
-        // Everyone who runs tells everyone who waits.
+        // Every running host informs every waiting one.
         if let Some(begun) = self.begun {
             let waiting = self.others.iter().filter(|(_, o)| o.heard.is_some() && o.ready && o.begun.is_none() && !o.left);
             let starts = waiting.filter_map(|(host, other)| {
@@ -450,7 +450,7 @@ impl Round {
         }
     }
 
-    /// Tells a person, and the bag.
+    /// Reports to a person, and to the bag.
     fn event(&mut self, severity: u32, kind: &'static str, text: &str) {
         self.publish(severity, kind, backdrive_msgs::NOT_MEASURED, text);
         let _ = self.send.send(There::Event(severity, kind, text.to_string()));

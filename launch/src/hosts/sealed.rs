@@ -1,7 +1,7 @@
 //! What supervisors say to each other under the secret that they share.
 //!
-//! Every word carries the speaker's nonce, a count and a tag. A recording of an earlier run is told by its nonce: a speaker is believed only after it has
-//! said that it heard this supervisor's nonce, which is of this start alone. After that its count has to grow.
+//! Every word carries the speaker's nonce, a count and a tag. A recording of an earlier run is recognised by its nonce: a speaker is trusted only after
+//! it has repeated this supervisor's nonce, which is of this start alone. After that its count has to grow.
 
 use super::words::Say;
 use crate::session::Session;
@@ -24,7 +24,7 @@ struct Envelope {
     tag: String,
 }
 
-/// Who said something.
+/// The sender of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Speaker {
     pub run: String,
@@ -40,7 +40,7 @@ struct Heard {
 /// What a word is worth.
 #[derive(Debug, PartialEq)]
 pub(super) enum Opened {
-    /// Said now, by who has the secret.
+    /// A current message, from a sender with the secret.
     Said(Speaker, Say),
     /// By who has the secret, but perhaps long ago; with whether it is the first of this speaker.
     Unproven { first: bool },
@@ -136,7 +136,7 @@ mod tests {
         assert_eq!(robot.open(&first), Opened::Unproven { first: true });
         assert_eq!(robot.open(&first), Opened::Unproven { first: false });
         assert_eq!(desk.open(&first), Opened::Nothing);
-        // The robot has heard the desk's nonce, and says so.
+        // The robot has heard the desk's nonce, and repeats it.
         assert!(matches!(desk.open(&hello(&mut robot, "robot")), Opened::Said(speaker, _) if speaker.run == "b2"));
         let second = hello(&mut desk, "desk");
         assert!(matches!(robot.open(&second), Opened::Said(..)));

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// When step 0 is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Begun {
-    /// CLOCK_MONOTONIC of the host that is told, ns.
+    /// CLOCK_MONOTONIC of the receiving host, ns.
     pub t0_ns: i64,
     /// Wall clock of the first host at that moment, ns since the Unix epoch: stamps of all hosts count from it.
     pub unix_ns: i64,
@@ -17,11 +17,11 @@ pub struct Begun {
 pub(super) enum Say {
     /// How it is, five times a second.
     Hello {
-        /// Tells graphs apart.
+        /// Distinguishes graphs.
         run: u64,
-        /// Who says it.
+        /// The sender.
         host: String,
-        /// Tells programs that call themselves the same host apart.
+        /// Distinguishes programs that call themselves the same host.
         life: u64,
         /// All its nodes are connected.
         ready: bool,
@@ -31,7 +31,7 @@ pub(super) enum Say {
         begun: Option<Begun>,
         /// It ends.
         leaving: bool,
-        /// Nonces of the others that it has heard: who reads its own there knows that this was said after it began.
+        /// Nonces of the others that it has heard: a receiver that reads its own there knows that this was sent after it began.
         heard: Vec<String>,
     },
     /// What is your clock?
@@ -56,7 +56,7 @@ pub(super) enum Say {
         /// Its wall clock, ns since the Unix epoch.
         unix_ns: i64,
     },
-    /// Step 0 is due, on the clock of whom is told.
+    /// Step 0 is due, on the clock of the receiver.
     Start {
         /// Whom.
         to: String,

@@ -57,8 +57,8 @@ impl Supervisor {
         }
     }
 
-    /// Whether a node that says that it is done has ended before its time although nobody asked: somebody sent it a signal, or it is a
-    /// program with an idea of its own. In lockstep the others end with it, as with one that is done.
+    /// Whether a node that reports that it is done has ended before its time although nobody asked. Either somebody sent it a signal, or it is a
+    /// program that decides on its own end. In lockstep the others end with it, as with one that is done.
     fn is_early(&self, index: usize, now: Instant) -> bool {
         let slot = &self.slots[index];
         if !slot.done || slot.asked != Asked::No || self.stopping || self.finishing.is_some() {

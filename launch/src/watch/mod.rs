@@ -47,7 +47,7 @@ impl Supervisor {
             }
         }
         self.watch(&mut signals, commands).await;
-        // Nobody is heard any more: a process with much to say must not wait for its listener.
+        // Output is ignored from now on: a process with much output must not wait for its listener.
         self.heard = None;
         if !self.unkillable {
             for slot in &mut self.slots {
@@ -143,19 +143,19 @@ impl Supervisor {
         }
     }
 
-    /// What is said of a node that shares the process of the first.
+    /// A message about a node that shares the process of the first.
     fn hear_of(&mut self, index: usize, node: String, said: FromNode, now: Instant) {
         match said {
             FromNode::Status(status) => self.slots[index].take_status(Some(&node), status, now),
             FromNode::Event { step, severity, kind, text, value } => {
                 self.happened(index, now, RunEvent { node, t_s: None, step: Some(step), severity, kind, text, value });
             }
-            // Everything else is said of the process.
+            // Everything else concerns the process.
             _ => {}
         }
     }
 
-    /// An event that a node tells. Where a stranger sends what moves something, the run ends; nothing of it was taken.
+    /// An event that a node reports. Where a stranger sends what moves something, the run ends; nothing of it was taken.
     fn happened(&mut self, index: usize, now: Instant, event: RunEvent) {
         let stranger = (event.kind == STRANGER && event.severity >= 2).then(|| (event.node.clone(), event.text.clone()));
         self.event(Some(index), RunEvent { t_s: self.start.map(|s| seconds_since(now, s.at)), ..event });

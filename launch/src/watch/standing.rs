@@ -13,7 +13,7 @@ const STAYS_STOPPED: Duration = Duration::from_millis(500);
 const OVERDUE: Duration = Duration::from_secs(1);
 
 impl Supervisor {
-    /// In real time the planned end is a time of day. Where every node stands still none says that it has come.
+    /// In real time the planned end is a time of day. Where every node stands still, none reports that it has come.
     pub(crate) fn see_planned_end(&mut self, now: Instant) {
         if self.plan.realtime() && self.planned_end().is_some_and(|end| now.saturating_duration_since(end) > OVERDUE) {
             self.finishing.get_or_insert(now);

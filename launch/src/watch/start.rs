@@ -27,8 +27,8 @@ impl Supervisor {
         });
         argv.extend(["--run".to_string(), root, "--name".to_string(), slot.plan.name.clone()]);
         slot.life += 1;
-        // A recorder may finish its file: the end of its standard input tells it to. Our own nodes set a signal
-        // that only wakes them, and end by themselves within seconds. Whoever hangs is left to the next sweep.
+        // A recorder may finish its file: it does so at the end of its standard input. Our own nodes set a signal that only wakes them, and end by
+        // themselves within seconds. Whoever hangs is left to the next sweep.
         let orphaned = if slot.plan.records { Signal::SIGTERM } else { Signal::SIGKILL };
         let label = slot.plan.label();
         let spawn = Spawn { name: &label, node: index, life: slot.life, argv: &argv, orphaned };
@@ -94,7 +94,7 @@ impl Supervisor {
         }
     }
 
-    /// What the other hosts say, and what this one says to them.
+    /// The messages of the other hosts, and those of this one to them.
     pub(crate) fn meet(&mut self) {
         let Some(hosts) = &self.hosts else { return };
         let lacks: Vec<String> = self.slots.iter().filter(|s| s.phase == Phase::Joining).map(Slot::lack).collect();

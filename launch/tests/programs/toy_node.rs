@@ -1,10 +1,9 @@
 //! A node that speaks the protocol and behaves as its arguments say. Times are counted from step 0.
 //!
-//! `lonely` never finds its peers, `mute` never says a word, `early` ends before it is ready,
-//! `crash MS`, `exit MS`, `fail MS` end it in the loop, `once FILE` makes the next of these happen in its
-//! first life only, `deaf` does not end when asked, `stubborn` ignores SIGTERM, `chatter N` writes lines,
-//! `events N` tells events, `stray` writes what is not of the protocol, `breed` leaves a child that holds
-//! its pipes, `steps N` ends it by itself (at 1000 per second), `bag FILE` makes it a recorder.
+//! `lonely` never finds its peers, `mute` never writes a word, `early` ends before it is ready. `crash MS`, `exit MS`, `fail MS` end it in the loop;
+//! `once FILE` makes the next of these happen in its first life only. `deaf` does not end when asked, `stubborn` ignores SIGTERM. `chatter N` writes
+//! lines, `events N` reports events, `stray` writes what is not of the protocol. `breed` leaves a child that holds its pipes, `steps N` ends it by
+//! itself (at 1000 per second), `bag FILE` makes it a recorder.
 
 use backdrive_launch::RunPaths;
 use backdrive_nodes::protocol::{FromNode, NodeStatus, ToNode};
@@ -152,7 +151,7 @@ fn end(toy: &Toy, name: &str, begun: Option<Instant>) -> Outcome {
     if let Some(bag) = toy.value("bag") {
         std::fs::write(bag, format!("{name} finished"))?;
     }
-    // Nobody may be left to hear it.
+    // There may be no listener any more.
     let _ = say(&FromNode::Done(status(toy, begun)));
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What a sample says beside its numbers, and what may be wrong with a payload.
+//! What a sample carries beside its values, and what may be wrong with a payload.
 
 /// What is wrong with a payload.
 #[derive(Debug, thiserror::Error)]
@@ -14,10 +14,10 @@ pub enum RosError {
     Cdr {
         /// ROS name of the expected type.
         type_name: &'static str,
-        /// What the CDR reader says.
+        /// The CDR reader's error.
         source: cdr_encoding::Error,
     },
-    /// A JointState of somebody else, or one of ours of which nobody says the step.
+    /// A JointState of somebody else, or one of ours whose step is not stated.
     #[error("JointState with header.frame_id {frame_id:?} was not sent by backdrive: read its fields by name instead")]
     Foreign {
         /// The frame id, cut to 64 bytes.
@@ -31,7 +31,7 @@ pub enum RosError {
     },
 }
 
-/// What a sample says that a `JointState` has no field for.
+/// Content of a sample that a `JointState` has no field for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facts {
     /// As [`crate::Sample::layout`].

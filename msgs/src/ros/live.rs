@@ -1,13 +1,12 @@
 //! Every message as a standard ROS 2 message, for the wire: what `ros2 topic echo`, PlotJuggler, rviz and a
 //! Foxglove bridge on another machine show with nothing of ours installed.
 //!
-//! A sample is a `JointState` whose `header.frame_id` says what JointState has no field for: `step=123 seq=123 src=89abcdef axes=2 flags=0
-//! layout=1`. A bag says it in messages of its own ([`super`]), which the wire cannot: samples may be lost here, a node of another host
-//! takes each by its step the moment it comes, and what stands in a second message would have to be waited for, and be lost alone.
-//! A quantity that was not measured is NaN, so that arrays are as long as there are axes. Gains, status and margin are a `JointState` too, whose `name` has the
-//! names of their fields and whose `position` has the values. An event is an `rcl_interfaces/msg/Log`: `name` is who
-//! tells it, `msg` its sentence, `function` its kind, and `file` carries what `Log` has no field for. Counts travel as
-//! floating point, so they are exact up to 2^53.
+//! A sample is a `JointState` whose `header.frame_id` holds what JointState has no field for: `step=123 seq=123 src=89abcdef axes=2 flags=0 layout=1`. A bag
+//! holds it in messages of its own ([`super`]), which the wire cannot: samples may be lost here, and a node of another host takes each by its step the moment
+//! it comes. The content of a second message would have to be waited for, and could be lost alone. A quantity that was not measured is NaN, so that arrays are
+//! as long as there are axes. Gains, status and margin are a `JointState` too, whose `name` has the names of their fields and whose `position` has the values.
+//! An event is an `rcl_interfaces/msg/Log`: `name` is the node that reports it, `msg` its sentence, `function` its kind, and `file` carries what `Log` has no
+//! field for. Counts travel as floating point, so they are exact up to 2^53.
 
 use super::mark::Mark;
 use super::time::Time;
@@ -53,12 +52,12 @@ struct Log<'a> {
     line: u32,
 }
 
-/// Writes the CDR of `message`, little endian and without encapsulation header, into `cdr`, replacing what was there. `speaker` is who tells an event; `names`
-/// are the axes of a sample, or for the other kinds [`fields`] as strings. A `mark` ends the text that says what the type has no field for, with
-/// zeros in place of its tag: see [`super::mark::marked`].
+/// Writes the CDR of `message`, little endian and without encapsulation header, into `cdr`, replacing what was there. `speaker` is the node that reports an
+/// event; `names` are the axes of a sample, or for the other kinds [`fields`] as strings. A `mark` ends the text that holds what the type has no field for,
+/// with zeros instead of its tag: see [`super::mark::marked`].
 ///
 /// # Errors
-/// None for any value of `message` as it is built today; the encoder's own are passed on.
+/// None for any value of `message` that can be built today; the encoder's own are passed on.
 pub fn encode(message: &Message, speaker: &str, names: &[String], mark: Option<&Mark<'_>>, cdr: &mut Vec<u8>) -> Result<(), RosError> {
     cdr.clear();
     let numbers = |values: &[f64]| listed(message, values);

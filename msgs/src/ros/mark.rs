@@ -1,7 +1,7 @@
 //! Who sent a message on the wire: ` run=RUN life=LIFE tag=TAG` at the end of the text that carries what standard messages have no field for.
 //!
-//! The type of the message is unchanged, so that any ROS tool reads it, and the tag travels in the message that it belongs to. What computes and
-//! checks tags is no matter of this crate: it only says where in the CDR their digits are.
+//! The type of the message is unchanged, so that any ROS tool reads it, and the tag travels in the message that it belongs to. Computing and checking
+//! tags is no matter of this crate: it only states where in the CDR their digits are.
 
 use super::RosError;
 use crate::topic::Kind;
@@ -33,7 +33,7 @@ impl fmt::Display for Mark<'_> {
 /// A mark that was found in a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Marked<'a> {
-    /// What it says.
+    /// Its content.
     pub mark: Mark<'a>,
     /// Where in the CDR the digits of the tag are.
     pub digits: Range<usize>,
@@ -52,7 +52,7 @@ pub fn marked(kind: Kind, little_endian: bool, cdr: &[u8]) -> Option<Marked<'_>>
     (is_name && is_tag).then_some(Marked { mark: Mark { run, life }, digits: range.end - TAG_DIGITS..range.end })
 }
 
-/// Where the text of a message is that says what its type has no field for: `header.frame_id`, or `file` of a `Log`.
+/// Where the text of a message is that holds what its type has no field for: `header.frame_id`, or `file` of a `Log`.
 fn text(kind: Kind, little_endian: bool, cdr: &[u8]) -> Option<Range<usize>> {
     // A stamp of two 32-bit numbers comes first; a Log then has a byte, and two strings before the one that is looked for.
     let (mut at, skipped) = if kind == Kind::Event { (9, 2) } else { (8, 0) };

@@ -17,7 +17,7 @@ pub(super) fn canonical(value: f64) -> f64 {
     if value.is_nan() { NOT_MEASURED } else { value }
 }
 
-/// `sensor_msgs/JointState` as it is written.
+/// `sensor_msgs/JointState` in the form that is written.
 pub(super) struct JointState<'a> {
     pub(super) sample: &'a Sample,
     pub(super) axis_names: &'a [String],
@@ -27,7 +27,7 @@ pub(super) struct JointState<'a> {
 /// What a JointState is written for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form<'a> {
-    /// A bag: no frame, and what else is to be said stands beside it.
+    /// A bag: no frame, and the other facts stand beside it.
     Bag,
     /// The wire: everything in one message, in the frame id.
     Wire(Option<&'a Mark<'a>>),
@@ -84,8 +84,8 @@ impl Serialize for Quantity<'_> {
     }
 }
 
-/// `sensor_msgs/JointState` as it is read, without allocating. A quantity that no axis has may be an empty array: older bags and
-/// other people write it so.
+/// `sensor_msgs/JointState` in the form that is read, without allocating. A quantity that no axis has may be an empty array: older bags and other
+/// people write it so.
 #[derive(Deserialize)]
 pub(super) struct JointStateIn {
     stamp: Time,
@@ -108,7 +108,7 @@ impl TryFrom<JointStateIn> for Sample {
 }
 
 impl JointStateIn {
-    /// The sample that it is part of, in either form: what its frame id says holds before `facts`.
+    /// The sample that it is part of, in either form: the content of its frame id takes precedence over `facts`.
     pub(super) fn sample(self, facts: &Facts) -> Result<Sample, RosError> {
         match self.frame {
             FrameIn::Ours(_) => Sample::try_from(self),
@@ -140,7 +140,7 @@ impl JointStateIn {
     }
 }
 
-/// What a frame id of ours says.
+/// Content of a frame id of ours.
 struct Frame {
     facts: Facts,
     axes: u32,
@@ -250,7 +250,7 @@ impl<'de> Deserialize<'de> for Values {
             fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Values, A::Error> {
                 let mut read = Values { values: [NOT_MEASURED; MAX_AXES], len: 0 };
                 while let Some(value) = seq.next_element::<f64>()? {
-                    // A longer array is somebody else's: its length tells on it, its values are not needed.
+                    // A longer array is somebody else's: its length shows this, its values are not needed.
                     if let Some(place) = read.values.get_mut(read.len) {
                         *place = canonical(value);
                     }

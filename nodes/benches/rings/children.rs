@@ -68,7 +68,7 @@ impl Process {
         self.stdout.take().map(BufReader::into_inner).ok_or_else(|| "standard output is taken".into())
     }
 
-    /// The next line that it says, without its end; empty after the last.
+    /// The next line of its output, without its end; empty after the last.
     pub fn line(&mut self) -> Result<String> {
         let mut line = String::new();
         self.stdout.as_mut().ok_or("standard output is taken")?.read_line(&mut line)?;

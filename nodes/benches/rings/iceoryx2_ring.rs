@@ -57,8 +57,8 @@ impl Member {
     }
 }
 
-/// The member at `index` of `members`, as a process of its own. It says `ready`; the first one then waits for a line, sends a message round
-/// `loops` times and says its figures. All end with their standard input.
+/// The member at `index` of `members`, as a process of its own. It prints `ready`; the first one then waits for a line, sends a message round `loops`
+/// times and prints its figures. All end with their standard input.
 pub fn member(index: usize, members: usize, size: usize, location: &Location, loops: u64) -> Result<ExitCode> {
     let node = join(location)?;
     let from = (index + members - 1) % members;

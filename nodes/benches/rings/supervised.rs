@@ -77,9 +77,9 @@ fn until_done(process: &mut Process) -> Result<NodeStatus> {
 pub struct Ended {
     /// From the start to the end of the one that was timed, s.
     pub seconds: f64,
-    /// What the timed one said when it was done.
+    /// The report of the timed one when it was done.
     pub status: NodeStatus,
-    /// The line that the timed one said after that; empty if none.
+    /// The line that the timed one wrote after that; empty if none.
     pub last: String,
 }
 

@@ -37,8 +37,8 @@ impl Files<'_> {
 }
 
 impl Sources<'_> {
-    /// What `read` makes of a file's text, its name and its folder. The first time a text goes into `seen` from which the same is read without a folder: the
-    /// file's own, or where it names further files (a robot, a network), what `written` makes of it. So what a bag holds stands alone.
+    /// What `read` makes of a file's text, its name and its folder. The first time, a text from which the same is read without a folder goes into `seen`. It
+    /// is the file's own text, or, where it names further files (a robot, a network), the output of `written`. So what a bag holds stands alone.
     pub(super) fn read_whole<T>(
         &self,
         path: &Path,

@@ -18,7 +18,7 @@ pub struct PortKind {
     pub doc: &'static str,
     /// Inputs: whether the graph must connect it.
     pub required: bool,
-    /// Outputs: last part of the usual topic, in CRTK's words; a command is told under the receiver's name.
+    /// Outputs: last part of the usual topic, in CRTK's words; a command is published under the receiver's name.
     pub topic: &'static str,
     /// Outputs: whether it commands the receiver.
     pub commands: bool,
@@ -245,7 +245,7 @@ kinds!(
     Canceller "canceller" CANCELLER,
     /// Position and force scaling.
     Scaling "scaling" SCALING,
-    /// A law between master and slave over a link, in the place of scaling.
+    /// A law between master and slave over a link, instead of scaling.
     Coupling "coupling" COUPLING,
     /// The remote device with its environment.
     Slave "slave" SLAVE,
@@ -253,7 +253,7 @@ kinds!(
     Controller "controller" CONTROLLER,
     /// Plays an excitation on a force channel.
     Exciter "exciter" EXCITER,
-    /// Estimates the force that nobody measures.
+    /// Estimates a force that is not measured.
     Observer "observer" OBSERVER,
     /// The operator of a test bench: pedal and speed over time.
     Cycle "cycle" CYCLE,

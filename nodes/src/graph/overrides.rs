@@ -8,7 +8,7 @@ use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value, value};
 
-/// Changes to a graph; `None` leaves what the file says. Files are relative to the working directory.
+/// Changes to a graph; `None` keeps the file's value. Files are relative to the working directory.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Overrides {
     /// Model of the master.
@@ -25,9 +25,9 @@ pub struct Overrides {
     pub canceller_grip: Option<PathBuf>,
     /// Corner of the canceller's high-pass, Hz.
     pub high_pass_hz: Option<f64>,
-    /// Whether the canceller takes the hand as its grip says (`as_modelled`) or estimates it (`estimated`).
+    /// Whether the canceller uses the hand of its grip file (`as_modelled`) or estimates it (`estimated`).
     pub hand: Option<String>,
-    /// Of a canceller that estimates the hand: the gain product from which on the loop shakes without a canceller.
+    /// Of a canceller that estimates the hand: the lowest gain product at which the loop oscillates without a canceller.
     pub edge_without: Option<f64>,
     /// Position scale.
     pub mu: Option<f64>,
@@ -49,7 +49,7 @@ pub struct Overrides {
     pub rate_hz: Option<f64>,
     /// Length of the run, s.
     pub duration_s: Option<f64>,
-    /// Whether the bag says on which machine and from which folders it was made.
+    /// Whether the bag records the machine and the folders that it was made from.
     pub record_origin: bool,
     /// Whether nodes wait by looking all the time.
     pub poll: bool,
@@ -79,7 +79,7 @@ impl Overrides {
         let name = path.display().to_string();
         let mut doc: DocumentMut = match text.parse() {
             Ok(doc) => doc,
-            // The parser that follows says where and why.
+            // The parser that follows reports where and why.
             Err(_) => return Ok(text.to_string()),
         };
         let here = std::env::current_dir().unwrap_or_default();
@@ -257,7 +257,7 @@ fn rename_programs(doc: &mut DocumentMut, change: &dyn Fn(&str) -> String) {
     }
 }
 
-/// A graph's text with other names for the files that it is made of, and everything else as it was. Text that is no TOML stays as it is.
+/// A graph's text with other names for the files that it is made of, and everything else unchanged. Text that is no TOML stays unchanged.
 pub fn with_files_renamed(text: &str, change: &dyn Fn(&str) -> String) -> String {
     let Ok(mut doc) = text.parse::<DocumentMut>() else { return text.to_string() };
     rename_files(&mut doc, change);
@@ -265,8 +265,8 @@ pub fn with_files_renamed(text: &str, change: &dyn Fn(&str) -> String) -> String
 }
 
 impl Graph {
-    /// Its text and its files as a bag holds them: files, programs and the bag have no folders, so that nothing tells on which
-    /// machine it was made, unless the graph asks for that. Of files that are called the same the second is `2-NAME`.
+    /// Its text and its files as a bag holds them. Files, programs and the bag have no folders, so that nothing identifies the machine on which it
+    /// was made, unless the graph asks for that. Of files that are called the same the second is `2-NAME`.
     pub fn portable(&self) -> (String, Vec<(String, String)>) {
         let (Ok(mut doc), false) = (self.text.parse::<DocumentMut>(), self.record_origin) else {
             return (self.text.clone(), self.files.clone());

@@ -1,4 +1,4 @@
-//! Forces as they were recorded: `recorded:file=impacts.csv,column=effort` in the place of an excitation.
+//! Recorded forces: `recorded:file=impacts.csv,column=effort` instead of an excitation.
 
 const PREFIX: &str = "recorded:";
 
@@ -55,7 +55,7 @@ impl Recorded {
         Some(Ok(recorded))
     }
 
-    /// A specification whose file is named differently; what is no recording stays as it is.
+    /// A specification whose file has another name; what is no recording stays unchanged.
     pub fn with_file(spec: &str, change: &dyn Fn(&str) -> String) -> String {
         let Some(keys) = spec.strip_prefix(PREFIX) else { return spec.to_string() };
         let pairs = keys.split(',').map(|pair| match pair.split_once('=') {

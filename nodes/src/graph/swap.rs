@@ -1,11 +1,11 @@
-//! A coupling in the place of scaling, written into a graph's text.
+//! A coupling instead of scaling, written into a graph's text.
 
 use backdrive_plant::tomlfile::FileError;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
-/// Lets the law `law` run in the graph's coupling. A graph with a scaling node gets a coupling of the same name in its place, so that
-/// topics keep their names: dither and guard go, what delays and impairs the way to the slave and back becomes the link's, and the force
-/// of the hand is connected where there is a master.
+/// Lets the law `law` run in the graph's coupling. In a graph with a scaling node, a coupling of the same name replaces it, so that topics keep their
+/// names. Dither and guard are removed, delays and impairments of the way to the slave and back become the link's, and the force of the hand is
+/// connected where there is a master.
 ///
 /// # Errors
 /// A graph that has neither a coupling nor a scaling node.

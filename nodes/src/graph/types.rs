@@ -40,7 +40,7 @@ pub struct Graph {
     pub bag: Option<PathBuf>,
     /// Whether a bag that exists may be replaced.
     pub overwrite: bool,
-    /// Whether the bag says on which machine and from which folders it was made.
+    /// Whether the bag records the machine and the folders that it was made from.
     pub record_origin: bool,
     /// Where nodes run, in the order of the file; empty for a graph that runs on one host.
     pub hosts: Vec<Host>,
@@ -71,7 +71,7 @@ pub struct Experiment {
     pub line: usize,
 }
 
-/// A host of a graph that runs on several, `[hosts.NAME]`. The first says when the run starts.
+/// A host of a graph that runs on several, `[hosts.NAME]`. The first decides when the run starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Host {
     /// What `--host` names.
@@ -118,7 +118,7 @@ pub struct DeviceFiles {
     pub fragment: Option<Fragment>,
     /// Substeps per period; chosen from the model where `None`.
     pub substeps: Option<usize>,
-    /// Whether sensors round and are noisy as the model file says.
+    /// Whether sensors have the rounding and noise of the model file.
     pub real_sensors: bool,
     /// How a master's hand changes its grip, times ascending; empty where it does not.
     pub grip_changes: Vec<GripChange>,
@@ -131,8 +131,8 @@ pub enum Settings {
     Operator(Vec<Intent>),
     /// The master plant and its grip.
     Master(DeviceFiles),
-    /// The model that predicts induced motion, the corner of its high-pass, Hz (0: none), and how the hand is estimated; `None` where the grip is taken
-    /// as the file says.
+    /// The model that predicts induced motion, the corner of its high-pass, Hz (0: none), and how the hand is estimated; `None` where the grip of the
+    /// file is used.
     Canceller(DeviceFiles, f64, Option<HandSettings>),
     /// Dither per axis as samples, N or N m, and whether the guard watches.
     Scaling {
@@ -145,7 +145,7 @@ pub enum Settings {
     Coupling {
         /// The law with its values.
         law: Law,
-        /// Corner of the low-pass behind which velocities are told from positions, Hz.
+        /// Corner of the low-pass behind which velocities are computed from positions, Hz.
         velocity_hz: f64,
     },
     /// The slave and what it touches.
@@ -177,7 +177,7 @@ pub enum Settings {
     Rig(DeviceFiles, RigSettings, Vec<Vec<f64>>),
 }
 
-/// What an observer node is told.
+/// The settings of an observer node.
 #[derive(Debug, Clone)]
 pub struct ObserverFiles {
     /// The model of the device, without what holds it.
@@ -190,7 +190,7 @@ pub struct ObserverFiles {
     pub weights: Weights,
     /// How far m is kept above the least one, above 1.
     pub back_off: f64,
-    /// Amplitude of displacement at which elements that are not linear are looked at, m or rad.
+    /// Amplitude of displacement at which elements that are not linear are evaluated, m or rad.
     pub amplitude: f64,
     /// Order and corner (Hz, 0 for none) of the Butterworth filter.
     pub filter: (usize, f64),

@@ -1,4 +1,4 @@
-//! How other threads reach a node that runs, and what it tells them.
+//! How other threads reach a running node, and what it reports to them.
 
 use crate::protocol::NodeStatus;
 use backdrive_msgs::{Gains, LAYOUT};
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// How a node runs, beyond what the graph says.
+/// How a node runs, beyond the settings of the graph.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Real time: a stage that is further behind than this, s, skips to the step that is due. Long
@@ -55,10 +55,10 @@ impl Control {
     }
 }
 
-/// What a running node tells whoever watches it. Small and without a heap, for it is told while stepping.
+/// What a running node reports to its observer. Small and without a heap, because it is sent while stepping.
 #[derive(Debug, Clone, Copy)]
 pub enum Told {
-    /// An event, as it is published.
+    /// An event, in its published form.
     Event(backdrive_msgs::Event),
     /// About ten times a second of real time.
     Status {

@@ -21,7 +21,7 @@ pub enum RunError {
         /// How long it waited, s.
         timeout_s: f64,
     },
-    /// Lockstep: samples were lost on the way, so the run is not what the graph says.
+    /// Lockstep: samples were lost on the way, so the run differs from its graph.
     #[error("step {step}: {lost} samples lost on {topic}")]
     Lost {
         /// The step at which it was seen.

@@ -77,7 +77,7 @@ impl Runner {
         let missing = stuck.flat_map(|s| s.inputs.iter().zip(&s.satisfied)).filter(|(_, satisfied)| !**satisfied);
         let topics: Vec<String> = missing.map(|(i, _)| i.topic.clone()).collect();
         let timeout_s = self.timing.peer_timeout_s;
-        // Of nodes that share the process the one that is furthest behind says it.
+        // Of nodes that share the process the one that is furthest behind reports it.
         let behind = self.stages.iter().filter(|s| s.step < steps).min_by_key(|s| s.step).map_or(0, |s| s.member);
         let teller = &mut self.members[behind].teller;
         let stamp = teller.book.simulated_ns(step);

@@ -17,7 +17,7 @@ pub(super) struct Member {
     pub(super) loop_time_recent: Histogram,
     /// Steps left out because the node was too far behind.
     pub(super) skipped: u64,
-    /// Late samples that were told, and when, ns.
+    /// Late samples that were reported, and when, ns.
     pub(super) late_told: (u64, i64),
 }
 

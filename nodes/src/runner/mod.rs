@@ -1,10 +1,9 @@
 //! Drives the stages of one node, or of several that share a process, over a transport in either clock.
 //!
-//! One rule for both: at step k a stage waits until all its inputs for k are there, or, in real time,
-//! until one period has passed since it could have begun; then it steps with what it has. In real time
-//! it does not begin step k before `t0 + k * period`. A stage that is late (the machine was elsewhere)
-//! does its late steps one after the other, each with its own inputs, so a hold-up of the whole machine
-//! costs no sample; only beyond [`Options::horizon_s`] does it go on at the step now due, and says so.
+//! One rule for both: at step k a stage waits until all its inputs for k are there. In real time it waits at most until one period has passed since
+//! it could have begun; then it steps with what it has. In real time it does not begin step k before `t0 + k * period`. A stage that is late (the
+//! machine was busy) does its late steps one after the other, each with its own inputs, so a hold-up of the whole machine costs no sample. Only
+//! beyond [`Options::horizon_s`] does it go on at the step now due, and reports this.
 
 mod control;
 mod error;
@@ -28,8 +27,8 @@ use stage::{lost, refused};
 use std::sync::Arc;
 
 impl Runner {
-    /// Runs until all steps are done or `control` stops it; tells events and reports on the way, and
-    /// returns the figures of the whole run, a node each.
+    /// Runs until all steps are done or `control` stops it; reports events and progress on the way, and returns the figures of the whole run, one set
+    /// for each node.
     ///
     /// # Errors
     /// In lockstep a missing input or a lost sample; in either clock a transport that fails for good.

@@ -32,7 +32,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Takes in what has arrived, and tells whether the step at hand can be done with it.
+    /// Takes in what has arrived, and returns whether the present step can be done with it.
     pub(super) fn poll(&mut self) -> Result<bool, TransportError> {
         let mut ready = true;
         for (input, satisfied) in self.inputs.iter_mut().zip(&mut self.satisfied) {

@@ -88,7 +88,7 @@ impl Runner {
             });
         }
         waiting.sort_by_key(|(place, ..)| *place);
-        // All outputs exist by now, so that an input can tell whether its topic is spoken on here.
+        // All outputs exist by now, so that an input can find whether its topic has a publisher here.
         let stages = waiting
             .into_iter()
             .map(|(_, member, is_first, stage, outputs)| {

@@ -1,4 +1,4 @@
-//! One step of a stage, and what is told of the steps.
+//! One step of a stage, and the report on the steps.
 
 use super::control::{Control, Told};
 use super::stage::{lost, refused, want};
@@ -35,7 +35,7 @@ impl Runner {
         stage.core.step(&tick, &stage.ports, &mut stage.samples, &mut member.teller.noted);
         stage.step += 1;
 
-        // What is told goes before the samples: a recorder that has the last sample has all of it.
+        // Reports are sent before the samples: a recorder that has the last sample has all of it.
         member.teller.drain(step, stamp_ns, tell);
         let mut first_error = Ok(());
         if stage.is_first {
@@ -86,7 +86,7 @@ impl Runner {
         }
     }
 
-    /// Gains that the supervisor or a topic wants. Which members a stranger would have given some, with what is to be told of it.
+    /// Gains that the supervisor or a topic wants. Which members a stranger would have given some, with the report on it.
     pub(super) fn take_gains(&mut self, control: &Control) -> Vec<(usize, TransportError)> {
         let mut strangers = Vec::new();
         if control.has_gains.swap(false, Ordering::Relaxed) {

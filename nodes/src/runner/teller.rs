@@ -16,7 +16,7 @@ pub(super) struct Teller {
     pub(super) status: Output,
     pub(super) noted: Events,
     pub(super) report: NodeStatus,
-    /// When a broken connection was last told, ns: once a second is enough.
+    /// When a broken connection was last reported, ns: once a second is enough.
     pub(super) broken_told_at: i64,
 }
 
@@ -24,7 +24,7 @@ impl Teller {
     pub(super) fn drain(&mut self, step: u64, stamp_ns: i64, tell: &mut dyn FnMut(Told)) {
         let Teller { book, events, noted, .. } = self;
         book.drain(step, stamp_ns, noted, |_, event| {
-            // An event that cannot be published is still told.
+            // An event that cannot be published is still reported.
             let _ = events.publisher.send(&Message::Event(event));
             tell(Told::Event(event));
         });

@@ -1,8 +1,8 @@
 //! The doorbell of one receiving node: a futex word that its publishers count up.
 //!
-//! A publisher pays for a system call only while the receiver sleeps, and only if the receiver waits
-//! for what it sends: a stage with several inputs would otherwise be woken for each, and look in vain. iceoryx2's own event costs
-//! two system calls on each side (a datagram), about twice the latency of a pipe.
+//! A publisher pays for a system call only while the receiver sleeps, and only if the receiver waits for what it sends. A stage with several inputs
+//! would otherwise be woken for each, and look in vain. iceoryx2's own event costs two system calls on each side (a datagram), about twice the
+//! latency of a pipe.
 
 use nix::libc;
 use std::cell::{Cell, RefCell};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const SLEEPING: u32 = 1;
 const RING: u32 = 2;
 
-/// Bit 0 says that the receiver sleeps or is about to; the rest counts rings. All zeros is a valid bell.
+/// Bit 0 is set while the receiver sleeps or is about to; the rest counts rings. All zeros is a valid bell.
 #[repr(C, align(64))]
 pub(crate) struct Bell {
     word: AtomicU32,
@@ -71,7 +71,7 @@ impl Bell {
         Bell { word: AtomicU32::new(0), awaited: AtomicU64::new(0) }
     }
 
-    /// Tells the receiver that something has arrived, with the tone of what it is.
+    /// Notifies the receiver that something has arrived, with the tone of what it is.
     #[inline]
     pub fn ring(&self, tone: u8) {
         let before = self.word.fetch_add(RING, Ordering::SeqCst);

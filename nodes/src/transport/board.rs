@@ -1,8 +1,8 @@
-//! The bell board of a run: one small page range in shared memory with a bell per receiving node,
-//! and per topic the set of bells that its publisher rings, and the tone it rings each with.
+//! The bell board of a run: one small page range in shared memory with a bell per receiving node. It also holds per topic the set of bells that its
+//! publisher rings, and the tone it rings each with.
 //!
-//! It holds no state that a crash could spoil: a slot belongs to a name, so a node that is started
-//! again finds its own, and the bell of a dead one is rung once for nothing.
+//! It holds no state that a crash could damage: a slot belongs to a name, so a node that is restarted finds its own, and the bell of a dead one is
+//! rung once without effect.
 
 use super::bell::Bell;
 use super::location::SHM;
@@ -79,8 +79,8 @@ impl Board {
         claim(name_hash(topic), self.layout().topics.iter().map(|e| &e.topic))
     }
 
-    /// From now on the topic's publisher rings this bell with this tone (0 to 63). It is never taken
-    /// back: ringing a bell at which nobody sleeps costs one addition.
+    /// From now on the topic's publisher rings this bell with this tone (0 to 63). It is never removed: ringing a bell without a sleeping receiver
+    /// costs one addition.
     pub fn listen(&self, topic: usize, bell: usize, tone: u8) {
         let entry = &self.layout().topics[topic];
         entry.tones[bell].store(tone, Ordering::SeqCst);

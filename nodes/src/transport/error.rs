@@ -13,7 +13,7 @@ pub enum TransportError {
         topic: String,
         /// `publish` or `subscribe`.
         action: &'static str,
-        /// What the middleware says, and what to do.
+        /// The middleware's message, and what to do.
         reason: String,
     },
     /// A message cannot be sent or received.
@@ -21,7 +21,7 @@ pub enum TransportError {
     Broken {
         /// The topic.
         topic: String,
-        /// What the middleware says.
+        /// The middleware's message.
         reason: String,
     },
     /// Somebody who is not of this run sends on the topic; nothing of it was taken.

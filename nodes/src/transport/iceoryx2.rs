@@ -149,7 +149,7 @@ impl Transport for Iceoryx2 {
 /// Beside every message: when it was sent, CLOCK_MONOTONIC, ns. The receiver has it in its queue from then on, however late it looks.
 type SentNs = i64;
 
-/// What iceoryx2 carries as it is.
+/// Types that iceoryx2 carries without conversion.
 trait Payload: ZeroCopySend + Debug + Copy + 'static {
     fn of(message: &Message) -> Option<&Self>;
     fn message(self) -> Message;

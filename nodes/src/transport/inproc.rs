@@ -169,7 +169,7 @@ impl Drop for Receiving {
     }
 }
 
-/// A queue is whole between any two statements that hold it, so a panic elsewhere does not spoil it.
+/// A queue is whole between any two statements that hold it, so a panic in other code does not damage it.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

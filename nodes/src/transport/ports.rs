@@ -40,15 +40,15 @@ pub trait Subscriber {
 
     /// When the message that [`Subscriber::receive`] gave last came here, CLOCK_MONOTONIC, ns; 0 before the first.
     ///
-    /// Between processes and threads of one machine that is when its publisher put it into the receiver's queue: nothing is on its
-    /// way in between, and it does not depend on when the receiver looks. From another host it is when the middleware took it in.
+    /// Between processes and threads of one machine that is when its publisher put it into the receiver's queue. Nothing is on its way in between,
+    /// and it does not depend on when the receiver looks. From another host it is when the middleware took it in.
     fn arrived_ns(&self) -> i64;
 
     /// Whether the topic has its publisher now.
     fn has_publisher(&self) -> bool;
 
-    /// Whether [`Transport::wait`] is to return for it; so from the start where it wakes at all. What
-    /// arrives meanwhile is kept as always, only nobody is woken for it.
+    /// Whether [`Transport::wait`] is to return for it; so from the start where it wakes at all. What arrives meanwhile is kept as always, only
+    /// without waking a receiver.
     fn set_awaited(&mut self, _awaited: bool) {}
 
     /// Messages that were refused because their sender is not of this run.
@@ -70,8 +70,8 @@ pub trait Subscriber {
 /// How many messages of a kind a transport keeps for a subscriber that is behind, and how many of
 /// the past for one that joins late.
 ///
-/// 4096 covers a recorder that polls every 10 ms and is itself held up for 50 ms while a lockstep
-/// graph does 40 000 steps a second; in lockstep the recorder's credit bounds it at any rate.
+/// 4096 covers a recorder that polls every 10 ms and is itself held up for 50 ms while a lockstep graph does 40 000 steps a second. In lockstep the
+/// recorder's credit bounds it at any rate.
 pub(crate) const fn capacity(kind: Kind) -> (usize, usize) {
     match kind {
         Kind::Sample => (4096, 0),

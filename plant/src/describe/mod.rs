@@ -1,4 +1,4 @@
-//! A model told to a person: its network, numbers, modes and responses, and what is odd about it.
+//! A description of a model for a person: its network, parameters, modes and responses, and what is unusual about it.
 
 mod check;
 mod diagram;
@@ -43,7 +43,7 @@ pub struct Description {
     pub responses: Vec<Response>,
     /// Why modes, poles and responses are missing, where they are.
     pub not_linear: Option<String>,
-    /// Amplitude at which hysteresis and the like were looked at, m or rad.
+    /// Amplitude at which hysteresis and the like were evaluated, m or rad.
     pub amplitude: f64,
     /// What is odd.
     pub remarks: Vec<Remark>,
@@ -117,7 +117,7 @@ pub struct ResponsePoint {
     pub phase_deg: f64,
 }
 
-/// Everything about a model, with what is not linear looked at as `at` says.
+/// Everything about a model; nonlinear elements are evaluated at the operating point `at`.
 pub fn describe(model: &Model, at: &Operating) -> Description {
     let motions = robot::motions(model);
     let mut description = Description {

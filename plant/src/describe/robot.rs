@@ -107,7 +107,7 @@ pub(super) fn robot_row(model: &Model, arm: &Arm) -> RobotRow {
     }
 }
 
-/// Whether each body turns or slides: as the model says, but of a robot's joints, and of what elements tie to them, as the joint does.
+/// Whether each body turns or slides: from the model, but for a robot's joints, and for bodies that elements tie to them, from the joint.
 pub(super) fn motions(model: &Model) -> Vec<Motion> {
     let mut known: Vec<Option<Motion>> = vec![None; model.bodies.len()];
     let Some(arm) = &model.arm else { return vec![model.motion; model.bodies.len()] };

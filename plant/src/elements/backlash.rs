@@ -9,8 +9,9 @@ use super::sine::Sine;
 /// Shaft with a total gap: `f = k (x - xb) + c (v - dxb/dt)`, xb the position inside the gap, `|xb| <= gap/2`.
 /// Memory: xb, m.
 ///
-/// Where touch sets in gradually (a lining, a band that wraps, teeth that are not parallel) the edges of the gap are round: `f = k s(x) + c s'(x) v`
-/// with `s = x + (√((x - α)² + w²) - √((x + α)² + w²))/2`, which goes over from 0 to `x ∓ α` within some w of either edge, and has no memory.
+/// Where contact begins gradually (a lining, a band that wraps, teeth that are not parallel) the ends of the gap are round: `f = k s(x) + c s'(x) v`
+/// with `s = x + (√((x - α)² + w²) - √((x + α)² + w²))/2`. This goes over from 0 to `x ∓ α` within some w of either end of the gap, and has no
+/// memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backlash {
     /// m, total: 2α.
@@ -19,7 +20,7 @@ pub struct Backlash {
     pub stiffness: f64,
     /// N s/m, of the shaft.
     pub damping: f64,
-    /// m, over which touch sets in: w. With 0 the edges are sharp.
+    /// m, over which touch sets in: w. With 0 the ends of the gap are sharp.
     pub rounding: f64,
 }
 
@@ -43,7 +44,7 @@ impl Backlash {
         vec![vec![self.gap], vec![self.stiffness], vec![self.damping], vec![self.rounding]]
     }
 
-    /// Distances of x from either edge, and their roundings.
+    /// Distances of x from either end of the gap, and their roundings.
     fn edges(&self, x: f64) -> [(f64, f64); 2] {
         [x - 0.5 * self.gap, x + 0.5 * self.gap].map(|u| (u, u.hypot(self.rounding)))
     }
@@ -163,7 +164,7 @@ mod tests {
     fn no_gap_is_a_spring_and_a_damper() {
         let law = Backlash { gap: 0.0, stiffness: 100.0, damping: 2.0, rounding: 0.0 };
         assert_eq!(law.force(&[0.0], -0.1, 0.5), -9.0);
-        // Whatever the edges of no gap.
+        // For any rounding of a gap of zero width.
         let law = Backlash { rounding: 1e-3, ..law };
         assert!((law.force(&[0.0], -0.1, 0.5) + 9.0).abs() < 1e-12);
     }
@@ -180,7 +181,7 @@ mod tests {
         for rounding in [1e-3, 1e-4, 1e-5] {
             let round = Backlash { rounding, ..sharp.clone() };
             let off = |x: f64| (pull(&round, x) - pull(&sharp, x)).abs() / 1e4;
-            // Half of the rounding at an edge, w²/(4 u) at u from it and less beyond, for √(u² + w²) - u < w²/(2 u).
+            // Half of the rounding at one end of the gap, w²/(4 u) at u from it and less beyond, for √(u² + w²) - u < w²/(2 u).
             let worst = (-50..=50).map(|i| off(1e-4 * f64::from(i))).fold(0.0, f64::max);
             assert!(worst <= 0.5 * rounding && worst < last && off(5e-3) < rounding * rounding / 4.0 / 4e-3, "{rounding}: {worst}");
             last = worst;

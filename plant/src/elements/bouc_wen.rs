@@ -161,7 +161,7 @@ impl PathLaw for BoucWen {
 
     fn stored(&self, memory: &[f64], x: f64) -> f64 {
         let hysteretic_displacement = memory.first().copied().unwrap_or(0.0);
-        // Unloading from z with slope between A and A (1 + |...|) gives back about z²/(2 A).
+        // Unloading from z with slope between A and A (1 + |...|) returns about z²/(2 A).
         0.5 * self.stiffness
             * (self.ratio * x * x + (1.0 - self.ratio) * hysteretic_displacement * hysteretic_displacement / self.amplitude)
     }

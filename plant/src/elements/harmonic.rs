@@ -9,8 +9,8 @@ const STEPS: usize = 512;
 /// Most cycles before the one that is measured, for hysteresis to close its loop.
 const SETTLE: usize = 100;
 
-/// Dry friction: nothing where it is ignored, else the damping that takes as much energy per cycle, `4 c/(pi A w)` for Coulomb friction.
-/// It is looked at without load and with the memory of rest.
+/// Dry friction: nothing where it is ignored, else the damping that takes as much energy per cycle, `4 c/(pi A w)` for Coulomb friction. It is
+/// evaluated without load and with the memory of rest.
 pub fn of_friction(law: &impl FrictionLaw, at: &Sine) -> Linear {
     if at.friction == DryFriction::Ignored {
         return Linear::default();
@@ -66,8 +66,8 @@ pub fn of_path(law: &impl PathLaw, at: &Sine) -> Linear {
             break;
         }
     }
-    // A loop that has not closed yet (lopsided hysteresis under a small sine creeps for thousands of cycles)
-    // gains as much force per distance on each cycle: that creep is no answer to the sine.
+    // A loop that has not closed yet gains as much force per distance on each cycle: that creep is no response to the sine. Asymmetric hysteresis
+    // under a small sine creeps for thousands of cycles.
     let (_, _, after, travelled) = cycle(None);
     let (in_phase, in_quadrature, ..) = cycle(Some((after - before) / travelled));
     let scale = TAU / STEPS as f64 / (PI * amplitude);

@@ -65,8 +65,8 @@ pub struct Rubbing<'a> {
     pub side: Side,
     /// Sliding speed, m/s, with its sign; `None` while it sticks.
     pub speed: Option<f64>,
-    /// Force of the joint that loads the contact, N (see [`crate::load`]): positive where it resists motion forwards, so that
-    /// `load * speed > 0` where the contact's bodies drive the joint and below 0 where the joint drives them. 0 where nothing loads it.
+    /// Force of the joint that loads the contact, N (see [`crate::load`]): positive where it resists motion forwards. So `load * speed > 0` where the
+    /// contact's bodies drive the joint, and below 0 where the joint drives them. 0 where nothing loads it.
     pub load: f64,
     /// The contact's memory.
     pub memory: &'a [f64],
@@ -111,7 +111,7 @@ pub trait PathLaw {
     /// Largest slopes of its force.
     fn slopes(&self) -> Slopes;
 
-    /// Force at `x` and `v` with the memory as it is.
+    /// Force at `x` and `v` with the present memory.
     fn force(&self, memory: &[f64], x: f64, v: f64) -> f64;
 
     /// Energy that can be had back, J.
@@ -142,7 +142,7 @@ pub trait PathLaw {
         false
     }
 
-    /// Whether its force is in proportion to the path that led to it, so that [`PathLaw::linearised`] is exact and depends on frequency alone.
+    /// Whether its force is proportional to the preceding path, so that [`PathLaw::linearised`] is exact and depends on frequency alone.
     fn is_viscoelastic(&self) -> bool {
         false
     }

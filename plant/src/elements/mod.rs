@@ -1,7 +1,7 @@
 //! Element kinds: one file each, and one line of registration here.
 //!
-//! A kind's file says what its parameters are ([`KindOf`]), what they are in one element (its struct, gathered in [`Law`]), and how it
-//! acts: it is a [`LinearLaw`], a [`FrictionLaw`] (dry, set-valued at rest) or a [`PathLaw`] (any other force).
+//! A kind's file defines its parameters ([`KindOf`]), their values in one element (its struct, gathered in [`Law`]), and how it acts. It is a
+//! [`LinearLaw`], a [`FrictionLaw`] (dry, set-valued at rest) or a [`PathLaw`] (any other force).
 //!
 //! The modules are declared by the registration, where `cargo fmt` does not see them: format a kind's file with
 //! `rustfmt --edition 2024 --config-path . plant/src/elements/KIND.rs`.
@@ -120,7 +120,7 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.advance(memory, from, to, dt), {})),* }
             }
 
-            /// Force of a [`Role::Path`], or of a linear law without inertance, at `x`, m, and `v`, m/s, with the memory as it is, N; 0 of dry friction.
+            /// Force of a [`Role::Path`], or of a linear law without inertance, at `x`, m, and `v`, m/s, with the present memory, N; 0 for dry friction.
             #[inline]
             pub fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
                 match self {
@@ -203,7 +203,7 @@ impl Law {
         self.level(&Rubbing { side, speed, load: 0.0, memory: &vec![0.0; self.memory_len()] })
     }
 
-    /// The same with every force `factor` times as large at every motion; as it is where the kind refuses such numbers.
+    /// The same with every force `factor` times as large at every motion; unchanged where the kind refuses such parameters.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Law {
         let kind = self.kind();

@@ -120,11 +120,11 @@ impl PreisachLugre {
         if creeps { v.abs() / self.level(v) } else { 0.0 }
     }
 
-    /// Lets the bristles creep along `way` (m, above 0) in `direction` (±1) under the level `level`, and gives what is left of the way.
+    /// Lets the bristles creep along `way` (m, above 0) in `direction` (±1) under the level `level`, and returns the rest of the way.
     #[inline]
     fn creep(&self, memory: &mut [f64], way: f64, direction: f64, level: f64, is_last: bool) -> f64 {
         let z = memory[0];
-        // dz/ds = 1 - f_p/level along the way s, with the slope of f_p as it is here: exact for straight curves.
+        // dz/ds = 1 - f_p/level along the way s, with the local slope of f_p: exact for straight curves.
         let rate = 1.0 - direction * preisach::force(&self.curves, memory) / level;
         if rate == 0.0 {
             return 0.0;
@@ -173,7 +173,7 @@ impl PathLaw for PreisachLugre {
             }
             if self.gate > 0.0 && along < edge {
                 let step = way.min(edge - along);
-                // To the edge exactly, so that the next part begins beyond it.
+                // To the boundary exactly, so that the next part begins beyond it.
                 let next = if step < way { direction * edge } else { memory[0] + direction * step };
                 preisach::advance(&self.curves, memory, next);
                 way -= step;

@@ -1,4 +1,4 @@
-//! The sine at which a law that is not linear is looked at.
+//! The sine at which a law that is not linear is evaluated.
 
 /// How dry (set-valued) friction enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

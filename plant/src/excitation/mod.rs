@@ -1,4 +1,4 @@
-//! What a device is shaken with: named excitations as functions of time.
+//! Excitation of a device: named excitations as functions of time.
 //!
 //! An excitation is written `sweep:amplitude=2,from=1,to=200,duration=10` on a command line, and as a table with
 //! `kind = "sweep"` in a file. Amplitudes are in the unit of the input that is driven (N, N m, m or rad).

@@ -17,7 +17,7 @@ pub(super) struct Lines {
 
 /// The lines of a band on a grid, as multiples of the inverse period; from 1 on.
 pub(super) fn lines_in(band: [f64; 2], period: f64, grid: Grid) -> Vec<usize> {
-    // Rounding must not lose a line that lies on the edge of the band.
+    // Rounding must not lose a line that lies at the end of the band.
     let first = (band[0] * period - 1e-9).ceil().max(1.0) as usize;
     let last = (band[1] * period + 1e-9).floor().max(0.0) as usize;
     (first..=last).filter(|k| grid == Grid::Full || k % 2 == 1).collect()
@@ -76,7 +76,7 @@ fn wave(lines: &[(usize, f64)]) -> Vec<Complex<f64>> {
     spectrum
 }
 
-/// One round of clipping the wave and keeping the phases of what is left (Van der Ouderaa et al. 1988).
+/// One round of clipping the wave and keeping the phases of the result (Van der Ouderaa et al. 1988).
 fn lower_crest(lines: &mut [(usize, f64)], round: u32) {
     let mut wave = wave(lines);
     let highest = wave.iter().fold(0.0_f64, |a, x| a.max(x.re.abs()));

@@ -1,4 +1,4 @@
-//! The kinds of excitation and their numbers.
+//! The kinds of excitation and their parameters.
 
 /// How the frequency of a sweep runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

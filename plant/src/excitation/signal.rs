@@ -6,11 +6,11 @@ use super::shape::{Shape, Spacing};
 use super::shapes;
 use std::f64::consts::PI;
 
-/// What shakes, and how it is framed.
+/// The excitation signal, and how it is framed.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Excitation {
-    /// The kind and its numbers.
+    /// The kind and its parameters.
     pub shape: Shape,
     /// Rest before it, s.
     pub quiet: f64,

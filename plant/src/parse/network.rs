@@ -12,7 +12,7 @@ pub const PORT: &str = "port";
 pub const HAND: &str = "hand";
 const GROUND: &str = "ground";
 
-/// Reads what a file says of itself: a model without a network, the motion that it names, and whether it is a fragment.
+/// Reads the head of a file: a model without a network, the motion that it names, and whether it is a fragment.
 pub(super) fn read_head(top: &mut Table) -> Result<(Model, Option<Motion>, bool), FileError> {
     let stem = Path::new(top.file_name()).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let model = Model {
@@ -217,7 +217,7 @@ fn read_law(table: &mut Table, kind: &Kind, folder: Option<&Path>) -> Result<Law
     (kind.build)(&values).map_err(|message| table.error(message))
 }
 
-/// A list parameter may name a CSV file beside the model; its numbers are taken row by row.
+/// A list parameter may name a CSV file beside the model; its values are read row by row.
 fn read_list_file(table: &mut Table, key: &str, range: Range, folder: Option<&Path>) -> Result<Vec<f64>, FileError> {
     let name = table.need_string(key)?;
     let Some(folder) = folder else {

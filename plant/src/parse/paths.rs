@@ -1,4 +1,4 @@
-//! Numbers of a model by their path: `bodies.drum`, `elements.cable.stiffness`, `inputs.feedback_force.delay`.
+//! Parameters of a model by their path: `bodies.drum`, `elements.cable.stiffness`, `inputs.feedback_force.delay`.
 
 use super::signals::delay_range;
 use crate::describe::unit_for;
@@ -126,7 +126,7 @@ pub enum NumberOf {
 }
 
 impl Model {
-    /// Values at a path (a number is a list of one); the error says in one sentence what there is instead.
+    /// Values at a path (a number is a list of one); the error names in one sentence what there is instead.
     pub fn values_at(&self, path: &str) -> Result<Vec<f64>, String> {
         Ok(match self.number_at(path)? {
             NumberOf::Body(body) => vec![self.bodies[body].inertia],
@@ -136,7 +136,7 @@ impl Model {
         })
     }
 
-    /// Unit of the number at a path for this model's motion, such as `N/m` or `N m/rad`; `-` where it has none. The error says in one sentence what
+    /// Unit of the number at a path for this model's motion, such as `N/m` or `N m/rad`; `-` where it has none. The error names in one sentence what
     /// there is instead of the path.
     pub fn unit_at(&self, path: &str) -> Result<String, String> {
         let unit = match self.number_at(path)? {
@@ -148,11 +148,11 @@ impl Model {
         Ok(unit_for(self.motion, unit))
     }
 
-    /// Sets the values at a path; the error says in one sentence what is wrong with path or values, and the model stays as it was.
+    /// Sets the values at a path; the error explains in one sentence what is wrong with path or values, and the model stays unchanged.
     pub fn set_values_at(&mut self, path: &str, values: &[f64]) -> Result<(), String> {
         let number = self.number_at(path)?;
         let one = |range: Range, unlimited: f64| match values {
-            // What a file says by leaving the key out.
+            // The meaning of an omitted key in a file.
             [x] if *x == unlimited => Ok(*x),
             [x] => check_range(*x, range).map(|()| *x).map_err(|e| format!("{path} {e}")),
             _ => Err(format!("{path} takes one number, not {}", values.len())),
@@ -196,7 +196,7 @@ impl Model {
         bodies.chain(self.elements.iter().flat_map(keys)).collect()
     }
 
-    /// Whose number a path leads to; the error says in one sentence what there is instead.
+    /// Whose number a path leads to; the error names in one sentence what there is instead.
     pub fn number_at(&self, path: &str) -> Result<NumberOf, String> {
         let bad = || format!("\"{path}\" is no path of a number; expected bodies.NAME or (elements|inputs|outputs).NAME.KEY");
         let (section, rest) = path.split_once('.').ok_or_else(bad)?;

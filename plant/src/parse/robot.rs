@@ -8,7 +8,7 @@ use crate::tomlfile::{self, FileError, Table};
 use nalgebra::{Rotation3, Vector3};
 use std::path::Path;
 
-/// Reads `[robot]`: its joints become the first bodies of the model, what its file says of their friction and springs elements.
+/// Reads `[robot]`: its joints become the first bodies of the model, and the friction and springs in its file become elements.
 pub(super) fn read_robot(table: &mut Table, model: &mut Model, folder: Option<&Path>) -> Result<(), FileError> {
     let (xml, name) = text(table, folder)?;
     let RobotFile { mut robot, remarks } = RobotFile::from_xml(&xml, &name)?;

@@ -84,7 +84,7 @@ impl MeasuredLoop {
 /// A fit of the deformed Dahl model to loops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// The numbers.
+    /// The parameters.
     pub dahl: DahlLoop,
     /// Root of the mean squared difference to the loops, N.
     pub rms: f64,

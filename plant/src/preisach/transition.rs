@@ -7,9 +7,9 @@ use super::dahl_loop::DahlLoop;
 pub struct Rise {
     /// F(α, β), N, at least 0.
     pub force: f64,
-    /// ∂F/∂(α - β) with the reach as it is, N/m.
+    /// ∂F/∂(α - β) with constant reach, N/m.
     pub along: f64,
-    /// ∂F/∂reach with the way as it is, N/m.
+    /// ∂F/∂reach with constant way, N/m.
     pub outward: f64,
 }
 

@@ -94,7 +94,7 @@ pub fn read_columns(mut table: Table) -> Result<Columns, FileError> {
 /// The rule at a key: a heading, or a table; `None` where the key is not there.
 pub(crate) fn read_one(table: &mut Table, key: &str) -> Result<Option<ColumnRule>, FileError> {
     if !table.contains(key) {
-        // Known from now on: a misspelling is told with its name.
+        // Known from now on: a misspelling is reported with its name.
         table.skip(key);
         return Ok(None);
     }

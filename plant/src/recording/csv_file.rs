@@ -32,7 +32,7 @@ pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     Ok(heading_of(&mut table, &name)?.1.iter().map(str::to_string).collect())
 }
 
-/// What is said of a table whose first row holds numbers.
+/// The error for a table whose first row holds numbers.
 pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers; \
      write one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ where no column is \
      the time); a line that begins with # is a comment";
@@ -59,7 +59,7 @@ fn heading_of<R: BufRead>(table: &mut TextTable<R>, name: &str) -> Result<(usize
 
 /// Reads the signals of a model from a CSV file: its inputs, and those of its outputs that were recorded. Other columns may hold anything.
 ///
-/// Where an input is missing that `may_be_absent` does not excuse, all columns are read, so that who asks for it can tell what there is.
+/// Where an input is missing that `may_be_absent` does not excuse, all columns are read, so that the caller can list what there is.
 ///
 /// # Errors
 /// As [`read_csv`].
@@ -70,7 +70,7 @@ pub fn read_signals_of(
     piece: &Piece,
     may_be_absent: &dyn Fn(&str) -> bool,
 ) -> Result<Recording, FileError> {
-    // What is wrong with the whole file is told by who reads the whole file.
+    // An error of the whole file is reported by the code that reads the whole file.
     let Ok(headings) = read_headings(path) else { return read_csv(path, None, columns, piece) };
     let there = |signal: &str| {
         columns.iter().any(|(ruled, _)| ruled == signal) || headings.iter().any(|h| h == signal || units::split(h).0 == signal)
@@ -80,7 +80,7 @@ pub fn read_signals_of(
     if signals_of(model).into_iter().all(|signal| there(signal) || !needed(signal)) {
         return read_csv(path, Some(&wanted), columns, piece);
     }
-    // Where a column of words is in the way of reading all, the missing one is told.
+    // Where a column of words prevents reading all, the missing one is reported.
     let with_missing: Vec<&str> = signals_of(model).into_iter().filter(|signal| there(signal) || needed(signal)).collect();
     read_csv(path, None, columns, piece).or_else(|_| read_csv(path, Some(&with_missing), columns, piece))
 }
@@ -88,7 +88,7 @@ pub fn read_signals_of(
 /// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
 ///
 /// Cells are separated by commas, semicolons, tabs or spaces. The first line is the heading, `name` or `name [unit]`; time is the column `t` unless
-/// `columns` says otherwise. A unit that `columns` names goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
+/// `columns` names another. A unit that `columns` names goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
 /// columns are not looked at. A cell that is no finite number, or a time that does not rise, is an error at its line.
 pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
     let name = path.display().to_string();
@@ -232,7 +232,7 @@ impl Headings<'_> {
         Ok(Wanted { signal: signal.to_string(), heading, index, factor, offset, unit })
     }
 
-    /// The column of the times: `time_ms` is in ms where nothing else says its unit.
+    /// The column of the times: `time_ms` is in ms unless another unit is stated.
     fn timed(&self, time: Wanted, columns: &Columns) -> Result<Wanted, FileError> {
         let is_ruled = columns.iter().any(|(signal, rule)| signal == "t" && (rule.unit.is_some() || rule.scale.is_some()));
         match units::of_times(&time.heading) {
@@ -254,7 +254,7 @@ impl Headings<'_> {
                 continue;
             }
             let heading = heading.to_string();
-            // A column that nobody asked for may be in any unit: where it is not known, the column keeps its whole heading as its name.
+            // A column that was not requested may be in any unit: where it is not known, the column keeps its whole heading as its name.
             let known = unit.map(units::parse).transpose().ok().filter(|_| !wanted.iter().any(|w| w.signal == name));
             wanted.push(match known {
                 Some(unit) => {

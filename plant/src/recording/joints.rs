@@ -11,11 +11,11 @@ pub struct JointColumns {
     pub name: String,
     /// Whether its velocity was logged.
     pub has_velocity: bool,
-    /// Torque per current that the set states, N m/A or N/A, where the current was logged in the place of the torque.
+    /// Torque per current that the set states, N m/A or N/A, where the current was logged instead of the torque.
     pub torque_constant: Option<f64>,
-    /// Whether the set says `torque = 0`: the joint has no motor, and no column holds its torque.
+    /// Whether the set has `torque = 0`: the joint has no motor, and no column holds its torque.
     pub is_passive: bool,
-    /// Whether the position that its servo was told was logged.
+    /// Whether the position command of its servo was logged.
     pub has_command: bool,
     /// Whether its torque was logged, or a current with a torque constant. Only a joint with a command may be without.
     pub has_torque: bool,
@@ -37,12 +37,12 @@ impl JointColumns {
         format!("{}.torque", self.name)
     }
 
-    /// Name of the signal of the position that its servo was told, rad or m.
+    /// Name of the signal of its servo's position command, rad or m.
     pub fn command(&self) -> String {
         format!("{}.command", self.name)
     }
 
-    /// A joint of a position servo whose torque nobody logged, with a column of each of these headings as it stands.
+    /// A joint of a position servo whose torque was not logged, with a column of each of these headings as it stands.
     pub fn of_servo(name: &str, command: &str, position: &str, columns: &mut Columns) -> JointColumns {
         let joint = JointColumns {
             name: name.to_string(),
@@ -90,8 +90,8 @@ fn is_zero(table: &mut Table, key: &str) -> Result<bool, FileError> {
     }
 }
 
-/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, or the `command` of a position servo, and perhaps
-/// `velocity`; each a heading or a table as in `[columns]`. The rules are added to `columns`.
+/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, or the `command` of a position
+/// servo. `velocity` is optional. Each is a heading or a table as in `[columns]`. The rules are added to `columns`.
 pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec<JointColumns>, FileError> {
     let mut joints = Vec::new();
     for name in table.keys() {

@@ -18,7 +18,7 @@ pub struct Recording {
     pub signals: Vec<(String, Vec<f64>)>,
     /// How regular the time axis is.
     pub jitter: Jitter,
-    /// Units that the file names for its signals, which are in SI units all the same.
+    /// Units that the file names for its signals, which are in SI units nevertheless.
     pub units: Vec<(String, Unit)>,
 }
 
@@ -112,7 +112,7 @@ pub enum RecordingError {
         name: String,
         /// The signal.
         signal: String,
-        /// As the file says.
+        /// From the file.
         unit: &'static str,
         /// What that measures.
         is: &'static str,
@@ -218,8 +218,8 @@ impl Recording {
         self.jitter.largest <= tolerance * self.period && self.jitter.gaps.is_empty()
     }
 
-    /// The recording on a regular grid of `period` s from its first sample on; each signal runs between its
-    /// samples as `hold` says for its name.
+    /// The recording on a regular grid of `period` s from its first sample on; `hold` gives for each signal name how it is interpolated between its
+    /// samples.
     pub fn onto_grid(&self, period: f64, hold: impl Fn(&str) -> Hold) -> Result<Recording, RecordingError> {
         let (first, last) = (self.t.first().copied().unwrap_or(0.0), self.t.last().copied().unwrap_or(0.0));
         // A grid point that rounding put just beyond the last sample is still inside.
@@ -232,8 +232,8 @@ impl Recording {
     /// The recording on a regular grid of its own.
     ///
     /// Times that are even but for their rounding stay as they are written. Where no sample is missing and none is half a period from its place, samples keep
-    /// their values and only the times are made even. Otherwise the grid has the median step, inputs of the model run between their
-    /// samples as their hold says, and all else runs linearly.
+    /// their values and only the times are made even. Otherwise the grid has the median step. Inputs of the model are interpolated by their hold, and
+    /// everything else linearly.
     pub fn regular_for(&self, model: &Model) -> Result<Recording, RecordingError> {
         if self.is_regular(ROUNDED) {
             return Ok(self.clone());

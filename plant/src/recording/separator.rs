@@ -6,8 +6,8 @@ use std::io::BufRead;
 /// have them in their names, too.
 const SEPARATORS: [u8; 4] = [b'\t', b';', b',', b' '];
 
-/// What stands between the cells of a text: a tab, a semicolon, a comma or a space; the first of these that its heading and its first row have equally often, what
-/// stands in quotes left aside. A comma where none does: who reads all of it says what is wrong.
+/// The separator between the cells of a text: a tab, a semicolon, a comma or a space. It is the first of these that its heading and its first row have
+/// equally often; quoted text is ignored. A comma where none does: the reader of the whole text reports the error.
 pub(super) fn separator_in(text: impl BufRead) -> u8 {
     let mut lines = text.lines().map_while(Result::ok).filter(|line| !line.starts_with('#') && !line.trim().is_empty());
     let (Some(heading), Some(first)) = (lines.next(), lines.next()) else { return b',' };
@@ -41,7 +41,7 @@ mod tests {
         assert_eq!(of("time, s;force, N\n0,1;2,5\n"), ';');
         assert_eq!(of("time, s\tforce, N\n0,1\t2,5\n"), '\t');
         assert_eq!(of("\"t\",\"x, filtered\"\n0, 1\n"), ',');
-        // Nothing fits: the reader of the whole file says so.
+        // Nothing fits: the reader of the whole file reports it.
         assert_eq!(of("motor position\n1\n"), ',');
         assert_eq!(of("t,x\n0\n"), ',');
         assert_eq!(of(""), ',');

@@ -15,14 +15,14 @@ pub struct TextTable<R> {
 /// What was looked at, what comes behind it, and a line feed: so every row ends with one.
 type Whole<R> = Chain<Chain<Cursor<Vec<u8>>, R>, &'static [u8]>;
 
-/// A heading and a row are looked for in so many bytes.
+/// A heading and a row are searched in this number of bytes.
 const MOST_LOOKED_AT: u64 = 1 << 20;
 
 impl<R: BufRead> TextTable<R> {
     /// Begins to read; of a pipe, too.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// Any error of the operating system.
     pub fn new(mut text: R) -> io::Result<TextTable<R>> {
         let mut begin = beginning(&mut text.by_ref().take(MOST_LOOKED_AT))?;
         if begin.starts_with(b"\xef\xbb\xbf") {
@@ -83,7 +83,7 @@ fn beginning<R: BufRead>(text: &mut Take<R>) -> io::Result<Vec<u8>> {
     Ok(begin)
 }
 
-/// What may be wrong with a cell that is no number, to be put behind what says so: a decimal comma.
+/// A possible cause why a cell is no number, to be appended to the message: a decimal comma.
 pub fn comma_remark(cell: &str) -> &'static str {
     match cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() {
         true => "; write decimal points in place of commas",

@@ -1,7 +1,7 @@
 //! Units that recordings come in, as they stand in a heading (`x [mm]`) or in `[columns]` (`unit = "mm"`).
 //!
-//! A table of its own and no crate: the crates for units check them when a program is compiled, and those that read text know either far more
-//! (parsing whole expressions) or not the kinds that a model's signals have.
+//! A table of its own and no crate: the crates for units check them when a program is compiled. Those that read text know either far more (parsing
+//! whole expressions) or not the kinds that a model's signals have.
 
 use crate::model::{InputKind, Model, Motion, OutputKind};
 
@@ -54,7 +54,7 @@ impl Kind {
 /// A unit: what it measures, and its size in the SI unit of that.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// As it is written.
+    /// Its spelling.
     pub name: &'static str,
     /// What it measures.
     pub kind: Kind,

@@ -8,18 +8,18 @@ use super::spatial::Twist;
 use super::tree::{Tree, Workspace};
 use nalgebra::DMatrix;
 
-/// Poses that an arm is looked at in, where a bound over all of them is wanted.
+/// Poses at which an arm is evaluated, where a bound over all of them is wanted.
 const POSES: usize = 24;
 /// How far a prismatic joint without limits is taken to move, m.
 const REACH: f64 = 1.0;
 
-/// A robot whose joints are bodies of a network. The position of such a body is the joint's coordinate less that of the pose; its own inertia is the
+/// A robot whose joints are bodies of a network. The position of such a body is the joint's coordinate less that of the pose. Its own inertia is the
 /// joint's armature; the inertia of the links, their Coriolis forces and gravity come from the tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     /// The robot file's text.
     pub xml: String,
-    /// What the file says.
+    /// The content of the file.
     pub robot: Robot,
     /// The robot ready for computing, without armatures.
     pub tree: Tree,
@@ -74,7 +74,7 @@ impl Arm {
         self.points.iter().map(over_bodies).collect()
     }
 
-    /// Whether a body of the network is a joint or a point, whose motion the links tell.
+    /// Whether a body of the network is a joint or a point, whose motion the links determine.
     pub fn moves(&self, body: usize) -> bool {
         self.bodies.contains(&body) || self.is_point(body)
     }

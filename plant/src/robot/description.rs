@@ -1,4 +1,4 @@
-//! A robot as data: what its file says, with every name resolved and every number in SI units. Nothing is computed here.
+//! A robot as data: the content of its file, with every name resolved and every number in SI units. Nothing is computed here.
 
 use super::spatial::Placement;
 use nalgebra::{Matrix3, Vector3};
@@ -18,7 +18,7 @@ pub struct Robot {
     pub actuators: Vec<Actuator>,
 }
 
-/// Free fall on earth where a file says nothing else, m/s².
+/// Free fall on earth where a file gives no other value, m/s².
 pub const STANDARD_GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
 impl Default for Robot {
@@ -75,7 +75,7 @@ impl JointKind {
     }
 }
 
-/// What a file says that a joint may do. The mechanics does not enforce it: a stop is an element, such as a `contact`.
+/// The limits of a joint in a file. The mechanics does not enforce it: a stop is an element, such as a `contact`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
     /// Between which coordinates, rad or m.

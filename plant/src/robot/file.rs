@@ -42,7 +42,7 @@ impl RobotFile {
     }
 }
 
-/// Checks what a reader has found, and says what is doubtful in it.
+/// Checks what a reader has found, and reports what is doubtful in it.
 fn finish(mut found: Found, file: &str) -> Result<RobotFile, FileError> {
     let line = |error: &RobotError| match error.part {
         Part::Robot => 1,

@@ -24,9 +24,9 @@ impl Tree {
         Some(body.map_or(*inside, |body| work.in_base[body].then(inside)))
     }
 
-    /// How a point of a link moves, as the bodies were placed last: for each coordinate the velocity of the point and the turning of the link per unit
-    /// of its rate, along the axes of the base. `point` is in the link's frame, m. Coordinates that do not move the link have 0; so have all where there is
-    /// no such link.
+    /// How a point of a link moves, in the last placement of the bodies. For each coordinate it holds the velocity of the point and the turning of the link
+    /// per unit of its rate, along the axes of the base. `point` is in the link's frame, m. Coordinates that do not move the link have 0; so have all where
+    /// there is no such link.
     pub fn jacobian(&self, link: usize, point: &Vector3<f64>, work: &Workspace, columns: &mut [Twist]) {
         columns[..self.len()].fill(Twist::default());
         let Some((Some(body), inside)) = self.links.get(link) else { return };

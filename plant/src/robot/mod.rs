@@ -1,7 +1,7 @@
 //! Arms: a tree of rigid links beside the network of elements.
 //!
-//! A [`Robot`] is what a robot file says: links with their inertia, joints with their axes, all names resolved. A [`Tree`] is the same made ready for
-//! computing: links that are fixed to each other are one body, and every moving joint is one coordinate. It knows
+//! A [`Robot`] is the content of a robot file: links with their inertia, joints with their axes, all names resolved. A [`Tree`] is the same made
+//! ready for computing: links that are fixed to each other are one body, and every moving joint is one coordinate. It knows
 //! - where every link is, and how it moves with the coordinates ([`Tree::place`], [`Tree::jacobian`]),
 //! - what force a motion takes (recursive Newton-Euler, [`Tree::inverse_dynamics`]) and what motion a force makes (articulated bodies,
 //!   [`Tree::forward_dynamics`]),

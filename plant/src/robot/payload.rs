@@ -18,7 +18,7 @@ pub struct Payload {
 }
 
 impl Robot {
-    /// The robot with a point mass more on one of its links, by index; a link that is not there leaves it as it is.
+    /// The robot with an additional point mass on one of its links, by index; a link that is not there leaves it unchanged.
     pub fn with_mass_at(&self, link: usize, mass: f64, at: Vector3<f64>) -> Robot {
         let mut out = self.clone();
         let Some(link) = out.links.get_mut(link) else { return out };
@@ -64,7 +64,7 @@ impl Arm {
     /// The arm with a payload on it.
     ///
     /// # Errors
-    /// Where the robot cannot be computed with it. A link that is not there leaves it as it is ([`Arm::link_of`] tells).
+    /// Where the robot cannot be computed with it. A link that is not there leaves it unchanged ([`Arm::link_of`] finds links).
     pub fn carrying(&self, payload: &Payload) -> Result<Arm, RobotError> {
         let Ok(link) = self.link_of(payload) else { return Ok(self.clone()) };
         let robot = self.robot.with_mass_at(link, payload.mass, payload.at);

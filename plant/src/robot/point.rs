@@ -34,8 +34,8 @@ impl Tree {
     }
 
     /// `J̇ v`: acceleration along `axis` of a point while the joints go on at the rates they have, m/s², as the bodies move since
-    /// [`Tree::velocities`]. With z_k, o_k axis and place of joint k and p the point, seen from the base, the sum over pairs of joints of the chain
-    /// of `z_i × (z_k × (p - o_k)) v_i v_k`, i being the one nearer the base.
+    /// [`Tree::velocities`]. With z_k, o_k axis and place of joint k and p the point, seen from the base, it is a sum over pairs of joints of the
+    /// chain. Each pair adds `z_i × (z_k × (p - o_k)) v_i v_k`, i being the one nearer the base.
     pub(crate) fn drift_here(&self, point: &Point, rates: &[f64], work: &Workspace, columns: &mut [Twist]) -> f64 {
         self.jacobian(point.link, &point.at, work, columns);
         let mut drift = Vector3::zeros();

@@ -166,7 +166,7 @@ impl Tree {
         self.bodies.iter().map(|body| body.reference).collect()
     }
 
-    /// Inertia of what only moves with this coordinate, kg m² or kg, in the place of the robot's own.
+    /// Inertia of what only moves with this coordinate, kg m² or kg; replaces the robot's own.
     pub fn set_armature(&mut self, coordinate: usize, armature: f64) {
         if let Some(body) = self.bodies.get_mut(coordinate) {
             body.armature = armature;

@@ -17,7 +17,7 @@ pub(super) fn parse<'a>(text: &'a str, file: &str) -> Result<Document<'a>, FileE
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     Document::parse_with_options(text, options).map_err(|error| {
         let (line, message) = (error.pos().row as usize, error.to_string());
-        // The parser says line and column in its own way.
+        // The parser formats line and column in its own way.
         let message = message.split(" at ").next().unwrap_or(&message).to_string();
         FileError::at(file, line, "", format!("is not valid XML at column {}: {message}", error.pos().col))
     })
@@ -116,7 +116,7 @@ impl<'a> Element<'a> {
         text.split_whitespace().map(|word| self.as_number(name, word, Range::Any)).collect()
     }
 
-    /// A text as so many numbers.
+    /// A text as this number of values.
     pub(super) fn as_array<const N: usize>(&self, name: &str, text: &str) -> Result<[f64; N], FileError> {
         let numbers = self.as_numbers(name, text)?;
         let count = numbers.len();

@@ -1,4 +1,4 @@
-//! A position servo at a joint: the numbers that say how it answers its commands (docs/servo.md has the equations).
+//! A position servo at a joint: the parameters of its response to commands (docs/servo.md has the equations).
 
 mod number;
 

@@ -1,4 +1,4 @@
-//! The numbers of a servo joint: what each is, its unit, its limits, and the value at which it does nothing.
+//! The parameters of a servo joint: what each is, its unit, its limits, and the value at which it does nothing.
 
 /// A number of a servo joint. Forces are those of the joint over the servo's proportional gain, so they are angles (rad).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -77,7 +77,7 @@ pub const FACTS: [Facts; COUNT] = [
     facts(Number::QuadraticDamping, "drag", "s^2/rad", [0.0, 10.0], 0.0, 0.01),
 ];
 
-/// The numbers of a servo joint.
+/// The parameters of a servo joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers(pub [f64; COUNT]);
 

@@ -80,7 +80,7 @@ impl Plant {
         self.motion = Some(motion);
     }
 
-    /// The motion as far as it is known before: what inputs push and prescribe, and how free bodies would go on.
+    /// The motion that is known before: pushed and prescribed by inputs, and the free continuation of free bodies.
     #[inline(always)]
     fn drive(&mut self, n: usize, from: f64, to: f64, motion: &mut Motion) {
         let h = self.substep;
@@ -359,7 +359,7 @@ fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> boo
             work.stop[c].1 = f64::NAN;
         }
     }
-    // Until the first of them stops all go on sliding: that motion tells when.
+    // Until the first of them stops all go on sliding: that motion gives the time.
     for (c, contact) in frictions.iter().enumerate() {
         if work.stop[c].1.is_nan() {
             work.force[c] = sliding(contact, work.bounds[c]);

@@ -22,7 +22,7 @@ pub fn ahead(model: &Model, inputs: &[impl AsRef<[f64]>], period_s: f64) -> Opti
     Some((caught_up, columns))
 }
 
-/// What a motion will be so many periods after each sample.
+/// The value of a motion this number of periods after each sample.
 fn earlier(pieces: &[Segment], samples: &[f64], lead: f64, period: f64) -> Vec<f64> {
     let (Some(last), Some(end)) = (samples.last(), pieces.last()) else { return samples.to_vec() };
     let whole = (lead.floor() as usize).min(samples.len());

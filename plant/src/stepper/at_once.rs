@@ -1,8 +1,8 @@
 //! Friction contacts solved directly: those that stick by one factorisation, which is kept while the same ones stick.
 //!
-//! A sliding contact has the force of its level, one that sticks whatever keeps its ends together. Which ones stick is first taken to be as it was in the
-//! last substep; a force beyond its level then lets a contact slide, a velocity against its force stops it, until all agree (a Newton method for the
-//! box-constrained problem; M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2002) 865).
+//! A sliding contact has the force of its level, one that sticks whatever keeps its ends together. The sticking set is first taken from the last substep.
+//! A force beyond its level then lets a contact slide, and a velocity against its force stops it, until all agree. This is a Newton method for the
+//! box-constrained problem (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2002) 865).
 
 use super::constraints::{Constraints, Work};
 use super::contact::Bounds;

@@ -1,4 +1,4 @@
-//! From a model to the numbers that a substep needs.
+//! From a model to the parameters that a substep needs.
 
 use super::compiled::{Compiled, Share};
 use super::constraints::{Constraints, Work};

@@ -1,9 +1,9 @@
 //! Dry friction and stiff elements, solved together.
 //!
-//! Each constraint is a scalar law between its force f and the mean relative velocity of its ends, `u = w - Σ P f`,
-//! with w the velocity that the rest would give and P = G A⁻¹ Gᵀ the compliance between constraints. Block
-//! Gauss-Seidel solves one law at a time exactly. Where friction contacts share their load so closely that it
-//! converges slowly, those that stick are solved directly; where there are friction contacts alone that comes first (`at_once.rs`).
+//! Each constraint is a scalar law between its force f and the mean relative velocity of its ends, `u = w - Σ P f`. Here w is the velocity without
+//! the constraint, and P = G A⁻¹ Gᵀ the compliance between constraints. Block Gauss-Seidel solves one law at a time exactly. Where friction contacts
+//! share their load so closely that it converges slowly, those that stick are solved directly; where there are friction contacts alone that comes
+//! first (`at_once.rs`).
 
 use super::contact::{Bounds, FrictionContact};
 use super::path::PathElement;
@@ -21,16 +21,15 @@ const ROUNDS: usize = 12;
 const TOLERANCE: f64 = 1e-14;
 /// The same for a law of the path, against the force that would stop its ends.
 const TOLERANCE_OF_LAWS: f64 = 4e-12;
-/// How exactly one law is solved, as a share of the velocities in it: steep laws round their force more coarsely than a velocity, and
-/// sweeps go on until forces change by less than a few times this.
+/// How exactly one law is solved, as a share of the velocities in it. Steep laws round their force more coarsely than a velocity, and sweeps go on
+/// until forces change by less than a few times this.
 const EXACT: f64 = 1e-12;
 /// Elements whose force changes by more than this share per share of velocity are solved implicitly.
 const STIFF: f64 = 0.1;
 /// The same where slopes are only estimates.
 const STIFF_UNBOUNDED: f64 = 0.01;
-/// Above this the substep does not resolve the element. Its force is then taken at the end of the substep, not in the
-/// middle: first order, but the work it does is never more than what it stored, so a stiff wall throws nothing back
-/// quicker than it came.
+/// Above this the substep does not resolve the element. Its force is then taken at the end of the substep, not in the middle. This is first order,
+/// but the work it does is never more than what it stored, so a stiff wall throws nothing back quicker than it came.
 const UNRESOLVED: f64 = 1.0;
 /// Evaluations of a law in one scalar solution.
 const EVALUATIONS: usize = 60;
@@ -92,8 +91,8 @@ impl Work {
 }
 
 impl Constraints {
-    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so. `from_forces` are what the bodies
-    /// answer to forces, and how their points move: first as they begin, then as they may come to answer where that changes on the way.
+    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are informed of it. `from_forces` are what the
+    /// bodies answer to forces, and how their points move: first as they begin, then as they may come to answer where that changes on the way.
     pub(super) fn new(
         from_forces: &[(Columns, Points)],
         free: usize,

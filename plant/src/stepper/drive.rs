@@ -17,7 +17,7 @@ pub(super) struct Drive {
     pub(super) offset: f64,
     saturation: f64,
     period: f64,
-    /// Whole periods of the delay, and what is left of it, s.
+    /// Whole periods of the delay, and the rest of it, s.
     delay_periods: usize,
     delay_rest: f64,
     /// Segments of the last `delay_periods + 2` periods, as a ring.

@@ -21,8 +21,8 @@ pub struct Energy {
 }
 
 impl Plant {
-    /// Counts the work of inputs, dampers and friction from the next start on, and starts anew. It costs time; a linear
-    /// model is then stepped by substeps instead of exactly, so its number of substeps should be given.
+    /// Counts the work of inputs, dampers and friction from the next start on, and restarts. It costs time; a linear model is then stepped by
+    /// substeps instead of exactly, so its number of substeps should be given.
     pub fn track_energy(&mut self) {
         self.energy = Some(Account::default());
         self.reset();
@@ -50,8 +50,8 @@ impl Plant {
         Energy { kinetic, stored, work_in, dissipated }
     }
 
-    /// Taken by one element of the model since the start (of hysteresis: what went in less what it still holds), J; not a number
-    /// until [`Plant::track_energy`] is called, and where there is no such element.
+    /// Energy taken by one element of the model since the start, J (of hysteresis: the input less what it still holds). Not a number until
+    /// [`Plant::track_energy`] is called, and where there is no such element.
     ///
     /// What back-EMF takes belongs to an input, so the elements' sum may be less than [`Energy::dissipated`].
     pub fn dissipated_by(&self, element: usize) -> f64 {

@@ -13,7 +13,7 @@ pub(super) trait Follow {
     fn noted(&mut self, plant: &Plant);
 }
 
-/// Nobody follows.
+/// Without a follower.
 impl Follow for () {
     #[inline(always)]
     fn forces(&mut self, _: &mut Plant, _: usize, _: &Motion) {}

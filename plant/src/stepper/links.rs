@@ -31,7 +31,7 @@ pub(super) struct Links {
     gravity: Vec<f64>,
     mass: DMatrix<f64>,
     coriolis: DMatrix<f64>,
-    /// Coriolis forces and gravity by place, at the last instant that was looked at, N m or N.
+    /// Coriolis forces and gravity by place, at the last instant that was evaluated, N m or N.
     pub(super) bias: Slots,
     /// Energy in gravity there, less that at the pose, J.
     pub(super) potential: f64,
@@ -134,7 +134,7 @@ impl Links {
         self.tree.coriolis_matrix_here(&self.v, &mut self.work, &mut self.coriolis);
         self.tree.gravity_here(&mut self.work, &mut self.gravity);
         let free = fixed.free;
-        // C(v₀) v₁, as far as it is known before: of free bodies at v₀.
+        // C(v₀) v₁, the part that is known before: of free bodies at v₀.
         self.bias_with(|slot| if slot < free { v[slot] } else { motion.end_velocity[slot] });
         for slot in self.slots.iter().filter(|slot| **slot < free) {
             motion.force[*slot] -= self.bias[*slot];

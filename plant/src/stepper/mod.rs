@@ -5,8 +5,8 @@
 //!   velocity. θ = 1 is the implicit midpoint rule. θ = 1/3 gives every undamped mode its frequency to fourth
 //!   order and is taken where the substep resolves the fastest one.
 //! - A model of such elements alone is advanced by its exact propagator instead (`exact.rs`).
-//! - Dry friction is a box-constrained multiplier on the velocity at the end of the substep (Moreau 1988, Jean 1999),
-//!   solved for all contacts at once: what sticks has velocity 0, not a small one (`constraints.rs`).
+//! - Dry friction is a box-constrained multiplier on the velocity at the end of the substep (Moreau 1988, Jean 1999), solved for all contacts at
+//!   once. A sticking contact has velocity 0, not a small one (`constraints.rs`).
 //! - Hysteresis is advanced along its path by the kind's own update. An element that is too stiff for the substep
 //!   joins the friction contacts in their implicit solution.
 //! - Points of a robot's links are places whose motion is that of the joints (`points.rs`). Linear elements at a point act along its path.

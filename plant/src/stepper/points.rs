@@ -1,9 +1,9 @@
 //! Points of a robot's links at work: places whose motion is that of the joints.
 //!
-//! A point has a place of its own in the state arrays, behind the free bodies, and a row: the derivatives of its displacement by the bodies that are
-//! joints. What pushes at the place is passed on to the joints (`Jᵀ F`), how the joints move tells how the place does (`J v`). Displacements are those of the
-//! geometry, not the row times the joints': nothing drifts. Over a substep the row is that in its middle, so the work of a force on a point is that of
-//! its joint forces, and forwards and backwards in time are the same.
+//! A point has a place of its own in the state arrays, behind the free bodies, and a row: the derivatives of its displacement by the bodies that are joints.
+//! A force at the place is transmitted to the joints (`Jᵀ F`), and the motion of the joints gives that of the place (`J v`). Displacements are those of the
+//! geometry, not the row times the joints': nothing drifts. Over a substep the row is that in its middle, so the work of a force on a point is that of its
+//! joint forces, and forwards and backwards in time are the same.
 
 use super::slots::{Columns, GROUND, SLOTS, Slots};
 
@@ -16,12 +16,12 @@ pub(super) struct Points {
     moved: usize,
     /// J, a row for each: m/rad or 1, by place of the joints.
     pub(super) rows: Vec<Slots>,
-    /// `J̇ v` at the instant that was looked at last, m/s².
+    /// `J̇ v` at the instant that was evaluated last, m/s².
     pub(super) drift: Vec<f64>,
 }
 
 impl Points {
-    /// So many points, from this place on, and so many bodies on motion inputs.
+    /// This number of points, from this place on, and of bodies on motion inputs.
     pub(super) fn new(first: usize, count: usize, prescribed: usize) -> Points {
         Points { first, moved: GROUND - prescribed, rows: vec![[0.0; SLOTS]; count], drift: vec![0.0; count] }
     }

@@ -1,7 +1,7 @@
 //! Linear models: exact propagation from sample to sample.
 //!
-//! With the state s = (x, v, lags) and inputs that are polynomials over the substep, `s' = A s + B u(t) + g` has the
-//! solution of an augmented system whose generator is constant; one matrix exponential gives it for every substep.
+//! With the state s = (x, v, lags) and inputs that are polynomials over the substep, `s' = A s + B u(t) + g` has the solution of an augmented system.
+//! Its generator is constant, and one matrix exponential gives the solution for every substep.
 
 use super::compiled::Compiled;
 use super::drive::Drive;
@@ -27,7 +27,7 @@ pub(super) struct Propagator {
 }
 
 impl Propagator {
-    /// Whether a network of so many free bodies is small enough.
+    /// Whether a network of this number of free bodies is small enough.
     pub(super) fn holds(free: usize, inputs: &[Input]) -> bool {
         let lags = inputs.iter().filter(|input| input.kind == InputKind::Force && input.bandwidth.is_finite()).count();
         2 * free + lags <= MAX_ROWS

@@ -8,9 +8,9 @@ use super::spline::segments;
 use super::state::Plant;
 use crate::model::Model;
 
-/// Outputs of a model, one column of N samples each, driven by `inputs`: one column of samples for each input of the
-/// model, `period_s` seconds apart, run between as the input's `hold` says. The model starts at rest, prescribed bodies at
-/// their first position. N is the length of the shortest column.
+/// Outputs of a model, one column of N samples each, driven by `inputs`. There is one column of samples for each input of the model, `period_s`
+/// seconds apart, interpolated by the input's `hold`. The model starts at rest, prescribed bodies at their first position. N is the length of the
+/// shortest column.
 ///
 /// # Errors
 /// When the model cannot be stepped or a column is missing.

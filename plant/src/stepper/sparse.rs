@@ -12,7 +12,7 @@ pub(super) const SMALL: usize = 8;
 /// What is solved in each substep, and what its right side is made of.
 #[derive(Debug, Clone)]
 pub(super) struct Sparse {
-    /// Stiffness, and what goes with the velocity: `(i, j, K, D + h K/2)`.
+    /// Stiffness, and the coefficient of the velocity: `(i, j, K, D + h K/2)`.
     entries: Vec<(usize, usize, f64, f64)>,
     /// Free bodies in the order of their elimination, with 1/D and where their part of `lower` ends.
     order: Vec<(usize, f64, usize)>,

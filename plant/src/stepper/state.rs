@@ -181,7 +181,7 @@ impl Plant {
 
     /// Whether every position and velocity is a finite number.
     pub fn is_finite(&self) -> bool {
-        // 0 times what is no number is none; the places that nobody uses are 0.
+        // 0 times what is no number is none; the unused places are 0.
         let mut sum = 0.0;
         for places in [0..self.fixed.free, self.fixed.points.places(), GROUND - self.fixed.prescribed..GROUND] {
             for (x, v) in self.x[places.clone()].iter().zip(&self.v[places]) {
@@ -191,7 +191,7 @@ impl Plant {
         sum == 0.0
     }
 
-    /// About how much a step of one period computes, in steps of a linear network: contacts and paths add to each substep, those that are solved
+    /// Approximate computation of a step of one period, in steps of a linear network. Contacts and paths add to each substep, those that are solved
     /// implicitly several evaluations of their law, and costly laws more.
     pub fn cost(&self) -> u64 {
         let (implicit, costly) = self.dear();

@@ -32,7 +32,7 @@ pub(super) struct Sticking {
 }
 
 impl Sticking {
-    /// Space for so many contacts.
+    /// Space for this number of contacts.
     pub(super) fn new(contacts: usize) -> Sticking {
         Sticking {
             set: vec![0; contacts],
@@ -64,7 +64,7 @@ impl Sticking {
         self.count = count;
     }
 
-    /// The factor of the set's compliance, of which `changes` says how often it has changed.
+    /// The factor of the set's compliance; `changes` counts how often it has changed.
     pub(super) fn factorise(&mut self, changes: u64, compliance: impl Fn(usize, usize) -> f64) {
         if self.factored == Some(changes) {
             return;

@@ -1,11 +1,11 @@
-//! Another network in the place of the one at work, which goes on from the same state.
+//! Replaces the network at work by another one, which continues from the same state.
 
 use super::state::Plant;
 
 impl Plant {
-    /// Puts the laws of `other` in the place of its own, which go to `other`; positions, velocities and memories stay where they are. Nothing is
-    /// allocated. Both must be compiled of one structure (the same bodies, elements, inputs and outputs; only numbers differ), for the same period and
-    /// substeps; where they are not, nothing happens and the answer is `false`.
+    /// Exchanges its laws with those of `other`; positions, velocities and memories stay where they are. Nothing is allocated. Both must be compiled
+    /// of one structure (the same bodies, elements, inputs and outputs; only numbers differ), for the same period and substeps; where they are not,
+    /// nothing happens and the answer is `false`.
     pub fn exchange_laws(&mut self, other: &mut Plant) -> bool {
         let alike = self.fixed.slots == other.fixed.slots
             && self.fixed.elements.len() == other.fixed.elements.len()

@@ -93,7 +93,7 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
     out
 }
 
-/// The robot with all that its file says; joint friction, springs and motors are among the elements and inputs already.
+/// The robot with the content of its file; joint friction, springs and motors are among the elements and inputs already.
 fn robot_keys(arm: &Arm) -> String {
     let pose = arm.tree.coordinates().iter().zip(&arm.pose).map(|(c, value)| format!("{} = {}", key(&c.name), number(*value)));
     let mut keys = vec![

@@ -83,7 +83,7 @@ pub enum PatchError {
     Section(String),
 }
 
-/// Makes the edits in their order; everything else of `original` stays as it is, comments included.
+/// Makes the edits in their order; everything else of `original` stays unchanged, comments included.
 pub fn patch(original: &str, edits: &[Edit]) -> Result<String, PatchError> {
     let mut document: DocumentMut = original.parse().map_err(|e: toml_edit::TomlError| PatchError::NotToml(e.message().to_string()))?;
     for edit in edits {
@@ -100,7 +100,7 @@ pub fn patch(original: &str, edits: &[Edit]) -> Result<String, PatchError> {
     Ok(document.to_string())
 }
 
-/// A number rounded to so many significant digits, for files that people read.
+/// A number rounded to this number of significant digits, for files that people read.
 pub fn round_significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

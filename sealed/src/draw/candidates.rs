@@ -21,7 +21,7 @@ pub(super) enum What {
 }
 
 impl What {
-    /// Whether a linear model can imitate it; of a law, whether its kind is linear whatever its numbers.
+    /// Whether a linear model can imitate it; of a law, whether its kind is linear for any parameters.
     pub fn is_linear(self) -> bool {
         match self {
             What::Law(kind, _) => kind.is_linear,
@@ -51,7 +51,7 @@ impl PartialEq for What {
 
 const AT_INPUTS: [What; 4] = [What::Delay, What::Bandwidth, What::BackEmf, What::Saturation];
 
-/// An effect without its numbers.
+/// An effect without its parameters.
 #[derive(Clone, PartialEq)]
 pub(super) struct Candidate {
     pub what: What,
@@ -62,7 +62,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Whether it can be told from what is chosen already: another place, or nothing alike at the same one.
+    /// Whether it can be distinguished from what is chosen already: another place, or nothing alike at the same one.
     pub fn goes_with(&self, chosen: &[Effect]) -> bool {
         chosen
             .iter()
@@ -116,8 +116,8 @@ fn at(network: &Network, between: [Place; 2]) -> impl Iterator<Item = (usize, &E
     network.elements.iter().enumerate().filter(move |(_, element)| matches(element))
 }
 
-/// Dry friction of a body against ground. It takes the place of Coulomb friction that the model states; beside another law it would be that law
-/// with other numbers.
+/// Dry friction of a body against ground. It takes the place of Coulomb friction that the model states; beside another law it would be that law with
+/// other parameters.
 fn friction(kind: &'static Kind, loaded: bool, body: usize, network: &Network) -> Option<Candidate> {
     let stated: Vec<&Element> =
         at(network, [Some(body), None]).map(|(_, element)| element).filter(|element| element.law.is_friction()).collect();
@@ -130,8 +130,7 @@ fn friction(kind: &'static Kind, loaded: bool, body: usize, network: &Network) -
     Some(Candidate { what: What::Law(kind, Draw::Friction { loaded }), site: to_ground(network, body), replaces, joint })
 }
 
-/// What a body has beside friction. A damper that the model states would only be that damper with another number; one that is
-/// lopsided takes its place.
+/// What a body has beside friction. A second damper would only be the model's damper with another value; an asymmetric one takes its place.
 fn at_body(kind: &'static Kind, damper: StatedDamper, body: usize, network: &Network) -> Option<Candidate> {
     let stated = at(network, [Some(body), None]).find(|(_, element)| matches!(element.law, Law::Damper(_)));
     let replaced = match damper {

@@ -1,4 +1,4 @@
-//! Nominal numbers that hide what is hidden.
+//! Nominal parameters that hide the hidden effects.
 
 use super::sizing::rounded;
 use crate::effects::{Effect, Physics, Site};
@@ -8,14 +8,14 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-/// The numbers of the nominal model that are wrong, by path.
+/// The parameters of the nominal model that are wrong, by path.
 type Numbers = BTreeMap<String, f64>;
 
 /// The true value over the nominal one of every number that is wrong, by path.
 ///
-/// A fit without the effect would have moved the numbers near it: damping up for what takes energy, stiffness down for what
-/// yields, inertia up for inertia, damping down for lag, which feeds motion. So the true number lies on the other side of the nominal
-/// one, by 30 to 100 % of `percent`. Where nothing is hidden, half of all numbers are off, either way.
+/// A fit without the effect would have moved the parameters near it: damping up for what takes energy, stiffness down for what yields, inertia up for
+/// inertia, damping down for lag, which feeds motion. So the true number lies on the other side of the nominal one, by 30 to 100 % of `percent`.
+/// Where nothing is hidden, half of all parameters are off, either way.
 pub(super) fn numbers(network: &Network, effects: &[Effect], percent: f64, random: &mut ChaCha8Rng) -> Numbers {
     let mut numbers = Numbers::new();
     if percent == 0.0 {
@@ -43,7 +43,7 @@ pub(super) fn numbers(network: &Network, effects: &[Effect], percent: f64, rando
     numbers
 }
 
-/// Paths of the numbers that take up part of an effect, and where the true value lies: above (1) or below (-1) the nominal one.
+/// Paths of the parameters that absorb part of an effect, and where the true value lies: above (1) or below (-1) the nominal one.
 fn absorbing(network: &Network, effect: &Effect) -> Vec<(String, f64)> {
     let bodies = touched(network, effect);
     let springs = |sign: f64| {

@@ -55,8 +55,8 @@ pub enum DrawError {
 
 /// Draws a truth for a nominal model, with its grip attached if it is to be held. The same seed and options give the same truth.
 ///
-/// Every effect shows: it changes an output of the nominal device under the working force by at least 3 % of that output's
-/// range. Whether a refit of other numbers could hide it is not asked.
+/// Every effect shows: it changes an output of the nominal device under the working force by at least 3 % of that output's range. Whether a refit of
+/// other parameters could hide it is not checked.
 ///
 /// # Errors
 ///

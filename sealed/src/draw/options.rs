@@ -7,8 +7,8 @@ pub struct DrawOptions {
     pub effects: usize,
     /// Whether only effects that no linear model can imitate are drawn.
     pub nonlinear_only: bool,
-    /// Per cent, 0 to 50, by which nominal numbers are wrong at most. With effects, those near one are wrong in the direction in
-    /// which a fit without it would have moved them; without effects, any of them in any direction.
+    /// Per cent, 0 to 50, by which nominal parameters are wrong at most. With effects, those near one are wrong in the direction in which a fit
+    /// without it would have moved them; without effects, any of them in any direction.
     pub masked_percent: f64,
     /// Per cent, 0 to 50, by which the grip's stiffness and damping differ from the nominal ones at most.
     pub grip_percent: f64,
@@ -25,8 +25,8 @@ pub struct DrawOptions {
 }
 
 impl Default for DrawOptions {
-    /// One effect of any kind; numbers wrong by up to 15 %, a grip by up to 20 %; encoder steps of up to 1/5000 and noise of up to
-    /// 1/1000 of the range; a contact task of 3 N and 5 mm at 5 kHz.
+    /// One effect of any kind; parameters wrong by up to 15 %, a grip by up to 20 %. Encoder steps of up to 1/5000 and noise of up to 1/1000 of the
+    /// range; a contact task of 3 N and 5 mm at 5 kHz.
     fn default() -> DrawOptions {
         DrawOptions {
             effects: 1,

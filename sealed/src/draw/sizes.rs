@@ -1,4 +1,4 @@
-//! The numbers of a drawn effect.
+//! The parameters of a drawn effect.
 
 use super::candidates::{Candidate, What};
 use super::options::DrawOptions;
@@ -11,7 +11,7 @@ use crate::network::{Element, Network, Place};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// The effect of a candidate with its numbers; `None` where the device does not move there under its working force.
+/// The effect of a candidate with its parameters; `None` where the device does not move there under its working force.
 pub(super) fn physics(c: &Candidate, network: &Network, probe: &Probe, options: &DrawOptions, random: &mut ChaCha8Rng) -> Option<Physics> {
     match &c.site {
         Site::Between(ends) => {

@@ -3,8 +3,8 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Share of the working force that dry friction takes. Below 3 % it is under what a hand tells apart in a force (some
-/// 7 % of it, Jones 1989) and little for a stability margin; above 15 % no one would call the device backdrivable.
+/// Share of the working force that dry friction takes. Below 3 % it is under the difference in force that a hand perceives (some 7 %, Jones 1989) and
+/// little for a stability margin; above 15 % no one would call the device backdrivable.
 pub(crate) const FRICTION: [f64; 2] = [0.03, 0.15];
 
 /// Share of the working force that viscous and back-EMF forces take at the working speed: as friction, and somewhat more,
@@ -29,7 +29,7 @@ pub(crate) fn share(of: [f64; 2], random: &mut ChaCha8Rng) -> f64 {
     between(of[0], of[1], random)
 }
 
-/// m, the way within which friction lets go: 1 to 15 % of the travel, which reversals show.
+/// m, the presliding displacement within which friction reaches its level: 1 to 15 % of the travel, which reversals show.
 pub(crate) fn presliding(travel: f64, random: &mut ChaCha8Rng) -> f64 {
     travel * between(0.01, 0.15, random)
 }

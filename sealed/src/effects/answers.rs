@@ -8,7 +8,7 @@ use crate::laws::around::Around;
 use crate::laws::families::VISCOUS;
 use crate::network::{Element, InputKind, Network};
 
-/// Names of physics of the same family as this one, which itself is among them where verdicts have a name for it.
+/// Names of effects of the same family as this one, which itself is among them where verdicts have a name for it.
 pub(super) fn family(physics: &Physics) -> Vec<String> {
     let lists: &[&[&str]] = match physics {
         Physics::Law(law) => law.facts().family,
@@ -21,7 +21,7 @@ pub(super) fn family(physics: &Physics) -> Vec<String> {
     lists.iter().flat_map(|list| list.iter()).map(|name| name.to_string()).collect()
 }
 
-/// Every right answer for an effect on this device: its own, and what the formats cannot tell apart from it.
+/// Every right answer for an effect on this device: its own, and what the formats cannot distinguish from it.
 pub(super) fn answers(physics: &Physics, site: &Site, replaces_something: bool, network: &Network) -> Vec<Answer> {
     let around = around(site, replaces_something, network);
     // What only moves a number of the model is nothing that a model leaves out.

@@ -1,4 +1,4 @@
-//! Hidden effects: physics at a place, how it changes a device, and which names for it are right.
+//! Hidden effects: a law at a place, how it changes a device, and which names for it are right.
 
 pub(crate) mod answer;
 mod answers;
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// A hidden effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
-    /// What it is, with its true numbers.
+    /// What it is, with its true parameters.
     #[serde(flatten)]
     pub physics: Physics,
     /// Where it sits, as `between` or `signal`. `between` runs as in the joint that it sits in.
@@ -32,7 +32,7 @@ pub struct Effect {
     pub in_formats: bool,
     /// What counts as finding it.
     pub accept: Vec<Answer>,
-    /// Names of physics that count as the right family, in the vocabulary of verdicts.
+    /// Names of effects that count as the right family, in the vocabulary of verdicts.
     pub family: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ impl Effect {
     ///
     /// # Errors
     ///
-    /// [`EffectError`] where the device has no such place or the effect's numbers are out of range. The device is then half changed.
+    /// [`EffectError`] where the device has no such place or the effect's parameters are out of range. The device is then half changed.
     pub fn apply(&self, network: &mut Network, number: usize) -> Result<(), EffectError> {
         let effect = self.physics.name();
         if let Some((key, value, expected)) = self.physics.unsound() {

@@ -1,10 +1,10 @@
-//! Physics that is hidden: a law of force, or something that is none.
+//! Hidden effects: a law of force, or something that is none.
 
 use crate::laws::Law;
 use crate::network::allowed::Allowed::{NotNegative, Positive};
 use serde::{Deserialize, Serialize};
 
-/// Physics that is hidden. In a truth file it is `physics`, its name, and `parameters`, its true numbers.
+/// A hidden effect. In a truth file it is `physics`, its name, and `parameters`, its true values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
 pub enum Physics {

@@ -53,14 +53,14 @@ impl Described for AsymmetricCoulomb {
 
     fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<AsymmetricCoulomb> {
         let Here::Body(at) = here else { return None };
-        // One direction carries 1.3 to 2.5 times the other: less is hardly lopsided.
+        // One direction carries 1.3 to 2.5 times the other: less is hardly asymmetric.
         let ratio = between(1.3, 2.5, random).sqrt();
         let (high, low) = (rounded(at.friction * ratio), rounded(at.friction / ratio));
         let [positive, negative] = if random.random_bool(0.5) { [high, low] } else { [low, high] };
         Some(AsymmetricCoulomb { positive, negative })
     }
 
-    /// Lopsided friction is friction with a bias. Where the model states the friction, the bias alone is what it leaves out.
+    /// Asymmetric friction is friction with a bias. Where the model states the friction, the bias alone is what it leaves out.
     fn same_as(&self, around: &Around) -> Vec<Answer> {
         let together_with = if around.replaces_something { Vec::new() } else { vec!["coulomb".to_string()] };
         vec![Answer { together_with, ..Answer::at(&around.site, &["bias"]) }]

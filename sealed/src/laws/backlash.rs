@@ -1,4 +1,4 @@
-//! A shaft behind a gap with sharp edges.
+//! A shaft behind a gap with sharp ends.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here, InJoint};

@@ -41,7 +41,7 @@ impl Described for Bias {
 
     fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<Bias> {
         let Here::Body(at) = here else { return None };
-        // A weight or a spring under tension that nobody balanced.
+        // A weight or a spring under tension that was not balanced.
         Some(Bias { force: if random.random_bool(0.5) { at.friction } else { -at.friction } })
     }
 
@@ -56,7 +56,8 @@ impl Described for Bias {
         if let Some(body) = ends.iter().find(|end| *end != GROUND).filter(|_| around.site.is_at_ground()) {
             all.extend(around.moved.iter().map(|hand| bias([body.clone(), hand.clone()])));
         }
-        // Where the reaction is taken by the body that the hand's spring holds, a hand somewhere else takes it on; one that nobody measured may be.
+        // Where the reaction is taken by the body that the hand's spring holds, a hand at another position explains it too; an unmeasured one may be
+        // there.
         for (_, held) in around.grip_ends.iter().filter(|(kind, _)| *kind == "spring") {
             let other = |name: &str| ends.iter().find(|end| *end == name).and_then(|_| ends.iter().find(|end| *end != name));
             if held == GROUND || around.moved.contains(held) {

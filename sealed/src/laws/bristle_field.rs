@@ -17,10 +17,10 @@ const BRISTLES_AT_MOST: usize = 1024;
 
 /// A field of bristles whose stiffness and break-away force are spread widely and independently of each other.
 ///
-/// Both are log-logistic over the field, in proportions that [`BristleField::bristles`] fixes, so that a few numbers say it all:
-/// the first slope of the virgin curve is `stiffness`, the force of steady sliding is `force`. Break-away forces may be higher
-/// near rest: all of them are then multiplied by `1 + (static_ratio - 1) exp(-(v/velocity)^2)`. No LuGre or Dahl law has this
-/// virgin curve, nor their loops its non-local memory; a handful of spring-sliders comes near it but never meets it.
+/// Both are log-logistic over the field, in proportions that [`BristleField::bristles`] fixes, so that a few parameters define it: the first slope of
+/// the virgin curve is `stiffness`, the force of steady sliding is `force`. Break-away forces may be higher near rest: all of them are then
+/// multiplied by `1 + (static_ratio - 1) exp(-(v/velocity)^2)`. No LuGre or Dahl law has this virgin curve, nor their loops its non-local memory; a
+/// handful of spring-sliders comes near it but never meets it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BristleField {
@@ -90,7 +90,7 @@ impl Described for BristleField {
         let (friction, stiffness, speed) = match here {
             Here::Body(at) => (at.friction, at.friction / presliding(at.travel, random), at.speed),
             Here::Joint(at) => {
-                // Rubbing flanks: 5 to 20 % of the working force, let go within 3 to 30 % of the working stretch.
+                // Rubbing flanks: 5 to 20 % of the working force, released within 3 to 30 % of the working stretch.
                 let friction = rounded(share([0.05, 0.2], random) * at.force);
                 (friction, friction / (at.stretch * between(0.03, 0.3, random)), at.speed)
             }
@@ -115,7 +115,7 @@ impl Described for BristleField {
     }
 }
 
-/// A [`BristleField`] with every bristle's numbers at hand.
+/// A [`BristleField`] with the parameters of every bristle computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaidField {
     bristles: MaxwellSlip,

@@ -45,7 +45,7 @@ impl Described for Damper {
         Some(Damper { damping: rounded(share(DRAG, random) * at.force / at.speed) })
     }
 
-    /// A motor that loses force to its speed is a damper to ground, and so is a hand's, where nobody knows its damper.
+    /// A motor that loses force to its speed is a damper to ground, and so is a hand's, where its damper is not known.
     fn same_as(&self, around: &Around) -> Vec<Answer> {
         if !around.site.is_at_ground() {
             return Vec::new();

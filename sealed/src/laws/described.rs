@@ -1,4 +1,4 @@
-//! What a law says of itself: how files name it, what sort of law it is, how it is drawn, and what a verdict may call it.
+//! A law's description of itself: its name in files, its sort, how it is drawn, and what a verdict may call it.
 
 use super::around::Around;
 use super::draw::{Draw, Here};
@@ -23,7 +23,7 @@ pub(crate) struct Facts {
     pub is_friction: bool,
     /// Whether a linear model can imitate it exactly, from wherever it rests.
     pub is_linear: bool,
-    /// Names of physics of the same family, in the vocabulary of verdicts, in lists.
+    /// Names of effects of the same family, in the vocabulary of verdicts, in lists.
     pub family: &'static [&'static [&'static str]],
 }
 
@@ -37,13 +37,13 @@ pub(crate) trait Described: Sized {
     const READ: Read<Self>;
     /// Where it is drawn as a hidden effect; empty where it is not.
     const DRAWS: &'static [Draw];
-    /// Keys of the numbers that a nominal model may have wrong.
+    /// Keys of the parameters that a nominal model may have wrong.
     const NUMBER_KEYS: &'static [&'static str] = &[];
 
     /// Its equations, ready to step.
     fn to_force(&self) -> Box<dyn ForceLaw>;
 
-    /// Its numbers, and what its equations take.
+    /// Its parameters, and the ranges that its equations accept.
     fn numbers(&self) -> Vec<Checked>;
 
     /// A law of a size that shows here, at one of the places of `DRAWS`; `None` where the device does not move there.
@@ -54,7 +54,7 @@ pub(crate) trait Described: Sized {
         vec![Self::NAME]
     }
 
-    /// Answers that are right beside its own names at its own place, since nothing tells them apart.
+    /// Answers that are right beside its own names at its own place, because nothing distinguishes them.
     fn same_as(&self, _around: &Around) -> Vec<Answer> {
         Vec::new()
     }

@@ -3,7 +3,7 @@
 /// A sort of place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Draw {
-    /// Dry friction of a body against ground, in the place of Coulomb friction that the model states.
+    /// Dry friction of a body against ground, instead of Coulomb friction that the model states.
     Friction {
         /// Whether it needs a joint whose force loads it.
         loaded: bool,

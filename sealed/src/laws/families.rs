@@ -1,4 +1,4 @@
-//! Names of physics that verdicts have, by family.
+//! Names of effects that verdicts have, by family.
 
 pub(super) const FRICTION: &[&str] =
     &["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "dahl", "lugre", "maxwell_slip", "preisach_lugre"];

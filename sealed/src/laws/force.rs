@@ -20,8 +20,9 @@ pub enum Load<'a> {
     None,
     /// The force of the element of this name, whichever way round it lies.
     Element(&'a str),
-    /// The force that is passed on: of friction between two bodies what else is between them, of a body's friction against ground the springs
-    /// between it and the first other body that elements join it with; where they join it with none, its springs to ground.
+    /// The transmitted force. For friction between two bodies it is that of the other elements between them. For a body's friction against ground it
+    /// is that of the springs between it and the first other body that elements join it with. Where they join it with none, it is that of its springs
+    /// to ground.
     Joint,
 }
 
@@ -43,8 +44,8 @@ pub trait ForceLaw: Send {
         0.0
     }
 
-    /// N, the levels of dry friction against motion forwards and backwards at speed `v` (m/s) under the force `load` (N) of what
-    /// [`ForceLaw::load`] says; of a joint it is positive where it resists motion forwards.
+    /// N, the levels of dry friction against motion forwards and backwards at speed `v` (m/s) under the force `load` (N) that [`ForceLaw::load`]
+    /// selects; of a joint it is positive where it resists motion forwards.
     fn dry(&self, _v: f64, _load: f64, _memory: &[f64]) -> [f64; 2] {
         [0.0, 0.0]
     }

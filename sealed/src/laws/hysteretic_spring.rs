@@ -9,8 +9,8 @@ use crate::network::allowed::Allowed::{Any, NotNegative, Positive};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Spring that nears one line while it is stretched and another while it is let go (Kuchenbecker and Niemeyer 2005, with the lag
-/// behind a ramp taken away): towards `o± + k± x`, the distance to the line falls by `e^(-bandwidth d)` on a way d.
+/// Spring that nears one line while it is stretched and another while it is released (Kuchenbecker and Niemeyer 2005, without the lag behind a ramp).
+/// Towards `o± + k± x`, the distance to the line falls by `e^(-bandwidth d)` on a way d.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HystereticSpring {

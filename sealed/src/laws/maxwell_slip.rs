@@ -1,4 +1,4 @@
-//! Parallel spring-sliders, each with its own numbers.
+//! Parallel spring-sliders, each with its own parameters.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here};
@@ -62,7 +62,7 @@ impl Described for MaxwellSlip {
 
     fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<MaxwellSlip> {
         let Here::Body(at) = here else { return None };
-        // Three to five sliders that let go one after the other between 0.2 and 3 times the way of presliding.
+        // Three to five sliders that slip one after the other between 0.2 and 3 times the way of presliding.
         let way = presliding(at.travel, random);
         let count = random.random_range(3..=5);
         let shares: Vec<f64> = (0..count).map(|_| random.random_range(0.5..=1.5)).collect();

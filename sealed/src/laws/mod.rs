@@ -1,7 +1,7 @@
 //! The laws of force between two bodies: those that model files name and those that only a hidden plant has.
 //!
-//! A law is one file, which holds everything that is said of it (`described::Described`), and one line here. The modules are declared by
-//! that line, where `cargo fmt` does not see them: format a law's file with `rustfmt --edition 2024 --config-path . sealed/src/laws/LAW.rs`.
+//! A law is one file, which holds its whole description (`described::Described`), and one line here. The modules are declared by that line, where
+//! `cargo fmt` does not see them: format a law's file with `rustfmt --edition 2024 --config-path . sealed/src/laws/LAW.rs`.
 
 pub(crate) mod around;
 mod bristle;
@@ -49,7 +49,7 @@ macro_rules! register {
         $(mod $file;)*
         $(pub use $file::$law;)*
 
-        /// A law of force with its numbers.
+        /// A law of force with its parameters.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
         pub enum Law { $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),* }
@@ -83,7 +83,7 @@ macro_rules! register {
                 match self { $(Law::$law(_) => <$law as Described>::FACTS),* }
             }
 
-            /// Its numbers, and what its equations take.
+            /// Its parameters, and the ranges that its equations accept.
             pub(crate) fn numbers(&self) -> Vec<Checked> {
                 match self { $(Law::$law(law) => law.numbers()),* }
             }

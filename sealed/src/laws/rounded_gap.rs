@@ -1,4 +1,4 @@
-//! A shaft behind a gap with rounded edges: a form of the hidden plant's own.
+//! A shaft behind a gap with rounded ends: a form of the hidden plant's own.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here, InJoint};
@@ -9,11 +9,10 @@ use crate::network::allowed::Allowed::{NotNegative, Positive};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Shaft behind a gap whose edges are worn round: `f = k s(x) + c s'(x) v` with
-/// `s(x) = w (ln(1 + e^((x - g/2)/w)) - ln(1 + e^((-x - g/2)/w)))`.
+/// Shaft behind a gap whose ends are worn round: `f = k s(x) + c s'(x) v` with `s(x) = w (ln(1 + e^((x - g/2)/w)) - ln(1 + e^((-x - g/2)/w)))`.
 ///
-/// s goes from 0 inside the gap g to `x ∓ g/2` outside, over a few widths w of rounding. It has no memory, and unlike a gap with
-/// sharp edges its stiffness is never quite zero: `s'(0) = 2/(1 + e^(g/(2w)))`.
+/// s goes from 0 inside the gap g to `x ∓ g/2` outside, over a few widths w of rounding. It has no memory, and unlike a gap with sharp ends its
+/// stiffness is never quite zero: `s'(0) = 2/(1 + e^(g/(2w)))`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoundedGap {
@@ -76,7 +75,7 @@ impl Described for RoundedGap {
 
     fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<RoundedGap> {
         let Here::Joint(at) = here else { return None };
-        // 10 to 60 % of the working stretch on each side, with edges rounded over 5 to 25 % of that.
+        // 10 to 60 % of the working stretch on each side, with ends rounded over 5 to 25 % of that.
         let half = at.stretch * between(0.1, 0.6, random);
         Some(RoundedGap {
             gap: rounded(2.0 * half),

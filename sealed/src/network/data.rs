@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 /// Index of a body; `None` is ground.
 pub type Place = Option<usize>;
 
-/// What a device is said to be: bodies, what joins them, and the signals that drive it and are read.
+/// The description of a device: bodies, what joins them, and the signals that drive it and are read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Network {
-    /// The model file that says so.
+    /// The model file that states this.
     pub nominal: Named,
     /// The grip that holds it, where one does.
     pub grip: Option<Named>,
@@ -74,7 +74,7 @@ pub enum Hold {
 pub enum InputKind {
     /// A force onto the body, N.
     Force,
-    /// The body's position, m: the body moves as it says.
+    /// The body's position, m: the body moves with the input.
     Motion,
 }
 
@@ -140,7 +140,7 @@ pub struct Axis {
     pub name: String,
     /// The body that a grip attaches to.
     pub user: usize,
-    /// Whether the hand is in the device's own numbers, so that no grip attaches.
+    /// Whether the hand is in the device's own parameters, so that no grip attaches.
     pub holds_user: bool,
     /// Index of the input that moves the hand that holds it, once one does.
     pub hand: Option<usize>,

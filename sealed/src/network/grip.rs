@@ -5,7 +5,7 @@ use super::data::{Body, Element, Hold, Input, InputKind, Named, Network};
 /// What joins the body that a hand holds to the hand's own motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grip {
-    /// The file that says so.
+    /// The file that states this.
     pub file: Named,
     /// Its elements; their places are [`Grip::PORT`], [`Grip::HAND`] and ground.
     pub(super) elements: Vec<Element>,
@@ -17,9 +17,9 @@ impl Grip {
 }
 
 impl Network {
-    /// The device with a hand on every axis that takes one: a body `hand` that the new input `intent` moves (m, straight from
-    /// sample to sample), and the grip's elements between it and the axis's user. From the second axis on all are called
-    /// after it, `side_hand` and `side_intent`. A device whose own numbers hold the hand stays as it is.
+    /// The device with a hand on every axis that takes one. It adds a body `hand` that the new input `intent` moves (m, straight from sample to
+    /// sample), and the grip's elements between it and the axis's user. From the second axis on all are called after it, `side_hand` and
+    /// `side_intent`. A device whose own parameters hold the hand stays unchanged.
     pub fn held(&self, grip: &Grip) -> Network {
         let mut held = self.clone();
         for axis in 0..self.axes.len() {

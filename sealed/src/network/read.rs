@@ -20,8 +20,8 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] with line and key: not TOML, an unknown or missing key, a number out of range, a name that is nowhere or twice,
-    /// a kind that this plant does not know, a free body without inertia, or a fragment in place of a device.
+    /// [`NetworkError`] with line and key: not TOML, an unknown or missing key, a number out of range, or a name that is nowhere or twice. Also for
+    /// a kind that this plant does not know, a free body without inertia, or a fragment instead of a device.
     pub fn from_toml(text: &str, file: &str) -> Result<Network, NetworkError> {
         let source = Source { file, text };
         let document = parse(source)?;

@@ -1,4 +1,4 @@
-//! A table of a TOML file that is read key by key: what is missing, wrong or left over is said with its file and line.
+//! A table of a TOML file that is read key by key: missing, wrong or unread keys are reported with their file and line.
 
 use super::allowed::Allowed;
 use std::collections::BTreeSet;
@@ -163,7 +163,7 @@ impl<'a> Section<'a> {
         Ok(found)
     }
 
-    /// Refuses keys that nobody took.
+    /// Refuses keys that were not read.
     pub fn finish(self) -> Result<(), NetworkError> {
         match self.table.iter().map(|(key, _)| key).find(|key| !self.taken.contains(*key)) {
             None => Ok(()),

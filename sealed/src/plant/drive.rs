@@ -128,7 +128,7 @@ impl Drive {
         self.mean(end - 1e-9 * self.period, end)
     }
 
-    /// Mean over a stretch of time, s from the beginning of the current period; edges of samples are met where they are.
+    /// Mean over a stretch of time, s from the beginning of the current period; jumps between samples are met exactly.
     fn mean(&self, from: f64, to: f64) -> f64 {
         let newest = self.past.len() as i64 - 1;
         let first = (from / self.period).floor() as i64;

@@ -3,8 +3,8 @@
 //! With the speeds `v0` before and `v1` after, `v = (v0 + v1)/2`, the forces `F` that positions and inputs set, and the dry
 //! friction `r` of every joint,
 //!
-//! `M (v1 - v0) = h (F - D v - G r)`,  `r` within its levels, at the upper one where the joint goes on forwards, at the lower
-//! one where it goes on backwards, in between only where it comes to rest (its part of `v1` is 0).
+//! `M (v1 - v0) = h (F - D v - G r)`, with `r` within its levels: at the upper one where the joint goes on forwards, at the lower one where it goes
+//! on backwards. It is in between only where the joint comes to rest (its part of `v1` is 0).
 //!
 //! Levels and dampings that hang on speed are taken at v0, then once more at the v that this gives.
 
@@ -210,7 +210,7 @@ impl Kick {
         }
         match dense::inverse(&pick(&full, all, &self.free), n) {
             Some(inverse) => self.inverse = inverse,
-            // Only a negative damping as large as the inertia does this. The speeds tell: they are no numbers then.
+            // Only a negative damping as large as the inertia does this. The speeds show it: they are no numbers then.
             None => self.inverse.fill(f64::NAN),
         }
         let count = self.dry.len();

@@ -18,7 +18,7 @@ fn of_joint(device: &Network, between: [Place; 2]) -> Vec<(usize, f64)> {
         [None, Some(body)] => [first_neighbour(device, body), Some(body)],
         both => both,
     };
-    // Dry friction has no force of its own path and counts for nothing.
+    // Dry friction has no force of its own path and counts as zero.
     let sign = |element: &Element| match element.between {
         ends if ends == joint => Some(1.0),
         [a, b] if [b, a] == joint => Some(-1.0),

@@ -1,11 +1,10 @@
 //! The hidden plant in time.
 //!
-//! The integrator is a splitting: drift (positions move with their speeds for half a substep), kick (speeds change at those
-//! positions), drift. For conservative forces that is the leapfrog, second order and symplectic, so the energy of a mode
-//! stays for any number of periods. Within the kick, damping is taken by the midpoint rule, which is stable at any size, and dry friction as
-//! what it is: a force within a box that brings the surfaces to rest if it can (`kick`). So stick is exact, no speed
-//! regularises anything, and no event is searched for; a reversal is late by at most a substep. Laws with a memory follow the
-//! positions of the kicks, exactly along each piece of their path.
+//! The integrator is a splitting: drift (positions move with their speeds for half a substep), kick (speeds change at those positions), drift. For
+//! conservative forces that is the leapfrog, second order and symplectic, so the energy of a mode stays for any number of periods. Within the kick,
+//! damping is integrated by the midpoint rule, which is stable at any size. Dry friction is a force within a box that brings the surfaces to rest if
+//! it can (`kick`). So stick is exact, no speed regularises anything, and no event is searched for; a reversal is late by at most a substep. Laws
+//! with a memory follow the positions of the kicks, exactly along each piece of their path.
 
 mod assemble;
 mod dense;
@@ -30,7 +29,7 @@ use crate::truth::Truth;
 /// `phase^2/24`, 1e-4 of itself, and that of a mode ten times slower by 1e-6.
 const PHASE_PER_SUBSTEP: f64 = 0.05;
 
-/// Substeps of a period at least, for reversals, dead times and edges that fall inside it.
+/// Substeps of a period at least, for reversals, dead times and jumps that fall inside it.
 const SUBSTEPS_AT_LEAST: usize = 20;
 
 /// The same where a look is enough: the fastest frequency is off by 4e-4 of itself.
@@ -65,7 +64,7 @@ impl SealedPlant {
         SealedPlant::resolving(nominal, truth, period_s, COARSE)
     }
 
-    /// At most so much phase of the fastest motion in a substep, rad, and at least so many substeps.
+    /// Phase of the fastest motion in a substep, rad, at most, and number of substeps at least.
     fn resolving(nominal: &Network, truth: &Truth, period_s: f64, fineness: (f64, usize)) -> Result<SealedPlant, PlantError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return Err(PlantError::Period(period_s));

@@ -12,7 +12,7 @@ impl SealedPlant {
         }
     }
 
-    /// Puts the body on a moved input elsewhere without a motion from where it was, m. Memories of what joins it go along.
+    /// Puts the body on a moved input at another position without a motion between the two, m. Memories of what joins it go along.
     pub(crate) fn move_hand(&mut self, input: usize, to: f64) {
         let Some(drive) = self.drives.get_mut(input) else { return };
         drive.start(to);

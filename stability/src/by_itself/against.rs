@@ -19,13 +19,13 @@ use backdrive_nodes::stage::Clock;
 pub struct Against {
     /// Contradictions: topic, factor and time, a sentence each.
     pub contradictions: Vec<String>,
-    /// Devices beside their models, where the rows in contact do not tell.
+    /// Devices beside their models, where the rows in contact do not decide.
     pub parts: Vec<PartCheck>,
-    /// What was recorded and not looked at, and why.
+    /// What was recorded and not examined, and why.
     pub notes: Vec<String>,
 }
 
-/// Steps that are looked at at once: memory for every sample of them is needed.
+/// Steps that are examined at once: memory for every sample of them is needed.
 const WINDOW: u64 = 40_000;
 
 /// Outputs that follow from inputs, by kind of node: port, quantity, whether each value is one that was given.
@@ -87,7 +87,7 @@ pub fn against(reader: &Reader, graph: &Graph) -> Result<Against, BagError> {
     Ok(found)
 }
 
-/// The outputs of a node that are looked at.
+/// The outputs of a node that are examined.
 fn told(graph: &Graph, index: usize) -> Vec<Told> {
     let Some(node) = graph.nodes.get(index).filter(|node| is_ours(node)) else { return Vec::new() };
     let computed = COMPUTED.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, exact)| (*port, *quantity, *exact, None));
@@ -128,10 +128,10 @@ fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool
     Ok(found)
 }
 
-/// An output that is looked at: port, quantity, whether each value is one that was given, and the part where it is a device.
+/// An output that is examined: port, quantity, whether each value is one that was given, and the part where it is a device.
 type Told = (&'static str, Quantity, bool, Option<&'static str>);
 
-/// A node that is looked at in a window.
+/// A node that is examined in a window.
 struct Look<'a> {
     graph: &'a Graph,
     index: usize,
@@ -165,7 +165,7 @@ struct Contradiction {
 }
 
 enum How {
-    /// Nothing comes in so many steps in which something is put out.
+    /// No input arrives during this number of steps in which something is put out.
     Silent(usize),
     /// In words.
     Differs(String),
@@ -259,7 +259,7 @@ fn is_unsteady(graph: &Graph, index: usize) -> bool {
     ways.filter_map(|way| way.impairment).any(|impairment| impairment.jitter_s > 0.0 || impairment.loss > 0.0)
 }
 
-/// Gains that a node had in force, as it told them.
+/// Gains that a node had in force, as it reported them.
 fn gains_of(window: &Window, node: &Node) -> Vec<Gains> {
     let topic = format!("/{}/gains", node.name);
     let mut gains: Vec<Gains> = window.gains.iter().filter(|(of, _)| *of == topic).map(|(_, gains)| *gains).collect();
@@ -308,7 +308,7 @@ fn differs(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f6
     };
     let rows: Vec<usize> = (0..recorded.len().min(predicted.len())).filter(differs).collect();
     let (first, last) = (rows.first().copied().unwrap_or(0), rows.last().copied().unwrap_or(0));
-    // The factor where they differ: elsewhere it is 1.
+    // The factor where they differ; 1 in all other places.
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for row in rows.iter().filter(|row| recorded[**row].is_finite()) {
         xx += predicted[*row] * predicted[*row];

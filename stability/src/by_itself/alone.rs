@@ -1,4 +1,4 @@
-//! One node by itself: what it would have put out of what the bag says it was given.
+//! One node by itself: the output that it would have computed from its recorded inputs.
 //!
 //! Where every node does of its recorded inputs what its recorded outputs show, nothing is hidden in the loop. Where one does not, that
 //! node, or the way to it, is what differs from the graph: so a fault is located before it is named. A node is run open loop, for a closed
@@ -70,7 +70,7 @@ pub(crate) struct Alone {
 }
 
 impl Alone {
-    /// Joins a node to players. `recorded` says how many axes each input has.
+    /// Joins a node to players. `recorded` has the number of axes of each input.
     pub(crate) fn new(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Alone, AloneError> {
         let node = plan(graph, name)?;
         let side = |part: &str| Topic { name: format!("/recorded/{part}"), kind: Kind::Event };

@@ -1,4 +1,4 @@
-//! A signal as it was recorded beside what it should have been: by how much they differ, and what simple thing would make one of the other.
+//! A recorded signal compared with its expected value: the size of the difference, and which simple change would explain it.
 
 use super::ways::{MOST_LATE, MOST_LATE_S, unsteady};
 use backdrive_signal::statistics::rms;
@@ -85,7 +85,7 @@ impl Default for Sensor {
     }
 }
 
-/// A difference below this share of the signal seldom shakes a loop.
+/// A difference below this share of the signal seldom makes a loop oscillate.
 pub const SMALL: f64 = 0.02;
 
 /// A simple thing explains a difference where it leaves no more of it than this.
@@ -120,7 +120,7 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     let share = error / scale;
     let said = |as_if: AsIf, left: f64| Some(Compared { error, share, as_if, left });
     let missing = missing_share(recorded, predicted);
-    // What is lost may be small beside a signal that rests, and is there all the same.
+    // A loss may be small beside a signal that rests, and is there nevertheless.
     if sensor.exact
         && (error > 0.0 || missing > 0.0)
         && let Some((late, jitter, lost)) = unsteady(recorded, predicted, period_s)
@@ -170,7 +170,7 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     rms(values.map(|x| x - mean))
 }
 
-/// Share of the rows at which something was to be said and nothing was.
+/// Share of the rows at which an output was due and none came.
 fn missing_share(recorded: &[f64], predicted: &[f64]) -> f64 {
     let (mut missing, mut count) = (0.0, 0.0);
     for (r, p) in recorded.iter().zip(predicted) {

@@ -25,7 +25,7 @@ pub(super) struct Output {
     pub(super) lockstep: bool,
 }
 
-/// What one window says of an output.
+/// What one window shows of an output.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct InWindow {
     output: Output,

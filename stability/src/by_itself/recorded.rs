@@ -3,7 +3,7 @@
 use backdrive_bags::{BagError, Reader};
 use backdrive_msgs::{Gains, Message, Sample};
 
-/// A loop is looked at over at most so many steps, the first of its bag: 200 s at 5 kHz.
+/// A loop is examined over at most this number of steps, the first of its bag: 200 s at 5 kHz.
 const MOST_STEPS: u64 = 1_000_000;
 
 /// Samples and events of a bag, one row per step.
@@ -15,16 +15,16 @@ pub struct Recorded {
     pub rows: usize,
     /// One track per topic of samples.
     pub tracks: Vec<Track>,
-    /// What nodes told: kind, text, number.
+    /// Events that nodes reported: kind, text, number.
     pub events: Vec<Told>,
     /// Gains in force, by topic.
     pub gains: Vec<(String, Gains)>,
 }
 
-/// An event as it was told.
+/// A reported event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Told {
-    /// Topic of the node that told it.
+    /// Topic of the node that reported it.
     pub topic: String,
     /// Machine-readable kind.
     pub kind: String,

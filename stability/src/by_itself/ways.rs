@@ -5,7 +5,7 @@ pub(crate) const MOST_LATE: usize = 4000;
 pub(crate) const MOST_LATE_S: f64 = 0.5;
 
 /// Of a node that only passes values on: how late each new one was, and the share that was lost. `None` where most of them are no earlier value at all.
-/// Where nothing new comes the node holds what it had, lets it decay, or says nothing.
+/// Where no new value arrives, the node holds its last value, lets it decay, or publishes nothing.
 pub(crate) fn unsteady(recorded: &[f64], predicted: &[f64], period_s: f64) -> Option<(usize, usize, f64)> {
     let most = MOST_LATE.min((MOST_LATE_S / period_s) as usize);
     let size = predicted.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -24,7 +24,7 @@ pub(crate) fn unsteady(recorded: &[f64], predicted: &[f64], period_s: f64) -> Op
         told += usize::from(place.is_some() || !decays);
         if let Some(place) = place {
             (oldest, last) = (place, Some(row));
-            // Where a signal stands still, which of its rows this is cannot be told.
+            // Where a signal stands still, its rows cannot be distinguished.
             if moves(place) {
                 lates.push(row - place);
             }
@@ -43,8 +43,8 @@ pub(crate) fn unsteady(recorded: &[f64], predicted: &[f64], period_s: f64) -> Op
     Some((late, jitter, lost))
 }
 
-/// Jitter, rows, and the share that is lost, of a way of which a share `comes` in time to be the newest, up to `span` rows late and `mean` on average: what
-/// is overtaken by a later sample is seen by nobody, so that those that are seen are less late than all.
+/// Jitter, rows, and the lost share of a connection. A share `comes` of its samples is the newest on arrival; they are up to `span` rows late and `mean`
+/// rows on average. A sample that a later one overtakes is never seen, so those that are seen are less late than all.
 fn scatter(comes: f64, span: usize, mean: f64) -> (usize, f64) {
     if span == 0 || span > MOST_SPAN {
         return (span, 1.0 - comes);
@@ -68,9 +68,9 @@ fn scatter(comes: f64, span: usize, mean: f64) -> (usize, f64) {
     all.into_iter().min_by(|a, b| a.2.total_cmp(&b.2)).map_or((span, 1.0 - comes), |(_, jitter, lost)| (jitter, lost))
 }
 
-/// Two ways whose samples are so nearly as late on average are not told apart, as a share.
+/// Two connections whose mean delays differ by less than this share are not distinguished.
 const ALIKE: f64 = 0.05;
-/// A way that is later than this from sample to sample is taken as it is seen, rows.
+/// Where the delay varies from sample to sample by more than this, it is taken as observed, rows.
 const MOST_SPAN: usize = 150;
 
 /// Rows after which a value that nothing renews may decay.
@@ -79,8 +79,8 @@ const HELD_ROWS: usize = 20;
 /// A share that counts as none.
 const NEVER: f64 = 1e-6;
 
-/// Share of the samples that are the newest when they arrive, and by how many rows these are late on average, where each is up to `jitter` rows late, every
-/// number of rows as likely, and a share `lost` never comes.
+/// Share of the samples that are the newest when they arrive, and by how many rows these are late on average. Each sample is up to `jitter` rows late with
+/// a uniform distribution, and a share `lost` never arrives.
 pub(crate) fn in_time(jitter: usize, lost: f64) -> (f64, f64) {
     let all = (jitter + 1) as f64;
     let (mut share, mut late) = (0.0, 0.0);

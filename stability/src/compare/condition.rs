@@ -34,7 +34,7 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Constant delay, nothing lost, the grip as it is.
+    /// Constant delay, no loss, unchanged grip.
     pub fn delay(delay_s: f64) -> Condition {
         Condition { varied: Varied::Delay, delay_s, jitter_s: 0.0, loss: 0.0, grip_scale: 1.0 }
     }

@@ -6,13 +6,13 @@ use crate::session::{AxisSignals, Session};
 use backdrive_signal::statistics::rms_of_finite;
 use serde::Serialize;
 
-/// Half the time over which a velocity is told from positions, s.
+/// Half the time over which a velocity is computed from positions, s.
 const VELOCITY_S: f64 = 0.005;
 
-/// A master that has gone less far into the wall than this shows no stiffness that could be told, m or rad.
+/// A master that has moved into the wall by less than this gives no measurable stiffness, m or rad.
 const LEAST_DEPTH: f64 = 10e-6;
 
-/// Numbers of a run, of the axis that touches hardest. `None` where it cannot be told: no contact, no hold, nothing that rests.
+/// Numbers of a run, of the axis that touches hardest. `None` where it cannot be determined: no contact, no hold, no rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Measures {
     /// Stiffness that the hand is shown while it holds still in contact over mu*lambda times that of the wall, no unit; 1 is transparent. `None`
@@ -34,7 +34,7 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Of a run with its verdict: of one that does not rest no stiffness is told.
+    /// Of a run with its verdict: no stiffness is reported for one that does not come to rest.
     pub fn of(session: &Session, outcome: &Outcome) -> Measures {
         let rows = 0..session.len();
         let size = |axis: &AxisSignals| rms_of_finite(rows.clone().map(|row| at(&axis.contact, row))).unwrap_or(0.0);

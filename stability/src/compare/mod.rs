@@ -1,5 +1,5 @@
-//! The same hand and the same environment through rivals of the canceller: edge, transparency, tracking and effort of each, over
-//! what the link does.
+//! The same hand and the same environment with alternatives to the canceller: stability limit, transparency, tracking and effort of each, over link
+//! conditions.
 
 mod condition;
 mod measures;
@@ -33,7 +33,7 @@ pub struct Cell {
     pub critical_gain: Option<f64>,
     /// The highest mu*lambda below that was found stable; 0 where none was.
     pub stable_up_to: f64,
-    /// Frequency just beyond the edge, Hz; 0 where it runs away without oscillating.
+    /// Frequency just above the stability limit, Hz; 0 for a run-away without oscillation.
     pub critical_frequency_hz: Option<f64>,
     /// What ends the stable range, in a sentence.
     pub edge: String,
@@ -49,12 +49,12 @@ pub struct Comparison {
     pub conditions: Vec<Condition>,
     /// The hand, per axis; the graph's own operator where `None`.
     pub intents: Option<Vec<Intent>>,
-    /// Over which gains the edges are looked for.
+    /// Range of gains that is searched for the stability limits.
     pub search: Search,
 }
 
 impl Comparison {
-    /// Gains over which edges are looked for: four to a decade, then narrowed to 5 %.
+    /// Gains that are searched for stability limits: four per decade, then refined to 5 %.
     pub const SEARCH: Search =
         Search { lowest: 0.05, floor: 0.005, highest: 20.0, tolerance: 0.05, per_decade: 4, whole_grid: false, around: false };
 

@@ -90,11 +90,11 @@ fn a_canceller_that_subtracts_nothing_gets_to_know_the_master() {
     assert_eq!(knows(&without), None);
 }
 
-/// The canceller is what lets the loop go beyond the edge of the bare law, and a bare law's edge falls with the delay.
+/// With the canceller the loop is stable above the critical gain of the bare law, and a bare law's critical gain falls with the delay.
 #[test]
 fn a_comparison_ranks_what_is_known() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    // Without the motor's limit of force, which a canceller runs into before it shakes.
+    // Without the motor's limit of force, which a canceller reaches before it oscillates.
     let limits = Some("ignored".into());
     let changes = Overrides { coupling: Some("direct".into()), limits, duration_s: Some(2.0), ..Overrides::default() };
     let of = |rival: Rival| {

@@ -1,4 +1,4 @@
-//! Which law it is: all of them fitted, held against time that they have not seen.
+//! Which law it is: all of them fitted, and compared on held-out time.
 
 use super::fit::{Fit, Ready, mean_square};
 use super::law::Term;
@@ -11,10 +11,10 @@ use std::ops::Range;
 
 /// Folds of held-out time: every fourth block.
 const FOLDS: usize = 4;
-/// A law that leaves so many times more in unseen time is worse, in however few blocks.
+/// A law whose residual on held-out time is larger by this factor is worse, even if there are few blocks.
 const SURELY_WORSE: f64 = 2.0;
-/// A term is worth a word only where it takes away at least this share of what is left: what a recording does not tell of filters and rounding is of
-/// that size.
+/// A term is reported only where it explains at least this share of the residual: the effect of filters and rounding that a recording does not
+/// determine is of that size.
 const WORTH: f64 = 0.05;
 /// What leaves less of the variance is exact: the rest is rounding of the computation.
 const EXACT: f64 = 1e-10;
@@ -26,11 +26,12 @@ const ROUGH_STEPS: usize = 5;
 const FULL_STEPS: usize = 12;
 /// See [`ROUGH_STEPS`].
 const FOLD_STEPS: usize = 2;
-/// A first fit that leaves so many times more than the best is surely worse in unseen time too; the best few of these are told as rivals.
+/// A first fit whose residual is larger than the best by this factor is surely worse on held-out time too; the best few of these are reported as
+/// rivals.
 const HOPELESS: f64 = 8.0;
 /// See [`HOPELESS`].
 const HOPELESS_TOLD: usize = 3;
-/// Rivals that are told.
+/// Number of rivals that are reported.
 const RIVALS: usize = 5;
 
 /// The laws that are tried, simplest first.
@@ -72,12 +73,12 @@ pub(super) fn choose(side: &Side) -> Option<SideLaw> {
     roughly.truncate(near + HOPELESS_TOLD);
     let mut tried: Vec<Tried> = roughly.into_par_iter().filter_map(|fit| attempt(side, &ready, fit)).collect();
     tried.sort_by(|a, b| a.total.total_cmp(&b.total));
-    // Where every law has a term that nobody would miss, the best of them all.
+    // Where every law has an unnecessary term, the best of them all.
     let best = tried.iter().find(|t| t.stands_out).or(tried.first())?;
     let worse = |law: &Tried, best: &Tried| worse(law, best, EXACT * variance);
     let as_good = |t: &&Tried| (t.stands_out || std::ptr::eq(*t, best)) && !worse(t, best);
     let chosen = tried.iter().filter(as_good).min_by(|a, b| a.fit.terms.len().cmp(&b.fit.terms.len()).then(a.total.total_cmp(&b.total)))?;
-    // The same law with a term more that nobody would miss is no rival.
+    // The same law with an additional unnecessary term is no rival.
     let same = |t: &Tried| {
         chosen.fit.terms.iter().all(|term| t.fit.terms.contains(term)) && (t.fit.terms == chosen.fit.terms || !worse(chosen, t))
     };
@@ -118,7 +119,7 @@ fn attempt(side: &Side, ready: &Ready, rough: Fit) -> Option<Tried> {
     total.is_finite().then_some(Tried { fit, unseen, total, stands_out })
 }
 
-/// Whether a law predicts worse than another: by block, in pairs, surely and by what is worth a word; or by far in all.
+/// Whether a law predicts worse than another: by block, in pairs, surely and by a relevant amount; or by far in all.
 fn worse(law: &Tried, best: &Tried, exact: f64) -> bool {
     if law.total <= exact {
         return false;

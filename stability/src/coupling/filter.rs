@@ -2,8 +2,8 @@
 
 use backdrive_signal::butterworth::{Butterworth, both_ways};
 
-/// A signal as it was `rows` samples before, by the cubic through its four neighbours; `rows` may be negative. Beyond its ends the signal stays
-/// as it is there.
+/// The signal delayed by `rows` samples, by the cubic through its four neighbours; `rows` may be negative. Beyond its ends the signal keeps its end
+/// value.
 pub(super) fn delayed(signal: &[f64], rows: f64) -> Vec<f64> {
     let last = signal.len() as i64 - 1;
     let at = |row: i64| signal.get(row.clamp(0, last.max(0)) as usize).copied().unwrap_or(0.0);

@@ -1,7 +1,7 @@
 //! One law fitted to one side: coefficients by least squares for each shape (filter, delays), the shape by Gauss-Newton steps.
 //!
-//! Separable least squares (Golub and Pereyra 1973). Intervals: residuals are neither white nor of one size, so the covariance is the sandwich with
-//! the scores summed over blocks of time (Liang and Zeger 1986), and t of as many degrees of freedom as there are blocks less one.
+//! Separable least squares (Golub and Pereyra 1973). Intervals: residuals are neither white nor of constant size. The covariance is therefore the
+//! sandwich with the scores summed over blocks of time (Liang and Zeger 1986). Student's t has one degree of freedom less than there are blocks.
 
 use super::filter::{FilteredRate, delayed};
 use super::law::{Law, Term, direction};
@@ -23,7 +23,7 @@ pub(super) struct Shape {
     pub(super) force_delay_s: f64,
 }
 
-/// The numbers of a shape, as a fit moves them.
+/// The parameters of a shape, as a fit moves them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     Filter,
@@ -46,11 +46,11 @@ pub(super) struct Fit {
     pub(super) shape: Shape,
     /// One per term, then the offset.
     pub(super) coefficients: Vec<f64>,
-    /// Mean square of what is left, of the rows that were fitted.
+    /// Mean square of the residual, of the rows that were fitted.
     pub(super) loss: f64,
 }
 
-/// What a side's terms look at, in the band; all but friction may be filtered before they are shaped.
+/// The inputs of a side's terms, in the band; all but friction may be filtered before they are shaped.
 pub(super) struct Ready<'a> {
     side: &'a Side,
     pub(super) force: Vec<f64>,
@@ -108,7 +108,7 @@ impl<'a> Ready<'a> {
         columns
     }
 
-    /// Coefficients for a shape by least squares over some rows, and the mean square of what is left there.
+    /// Coefficients for a shape by least squares over some rows, and the mean square of the residual there.
     fn linear(&self, columns: &[Vec<f64>], rows: &[Range<usize>]) -> Option<(Vec<f64>, f64)> {
         let n = columns.len();
         let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -125,7 +125,7 @@ impl<'a> Ready<'a> {
         loss.is_finite().then_some((coefficients, loss))
     }
 
-    /// What is left of the force.
+    /// The residual of the force.
     fn left(&self, columns: &[Vec<f64>], coefficients: &[f64]) -> Vec<f64> {
         let mut left = self.force.clone();
         for (column, c) in columns.iter().zip(coefficients) {
@@ -145,7 +145,7 @@ impl<'a> Ready<'a> {
         columns.iter().zip(&fit.coefficients).take(fit.terms.len()).map(|(column, c)| c.abs() * deviation(column)).collect()
     }
 
-    /// The force that a law makes of one step of the position sensor: what adds less cannot be told from rounding.
+    /// The force that a law computes from one step of the position sensor: a term that adds less cannot be distinguished from rounding.
     pub(super) fn rounding(&self, fit: &Fit) -> f64 {
         let position = fit.terms.iter().position(|t| *t == Term::Position).and_then(|i| fit.coefficients.get(i));
         position.map_or(0.0, |c| c.abs() * self.side.resolution)
@@ -222,7 +222,7 @@ impl<'a> Ready<'a> {
         Some(fit)
     }
 
-    /// A shape moved by a step of one of its numbers: the filter in its logarithm, delays in rows.
+    /// A shape with one of its parameters moved by a step: the filter in its logarithm, delays in rows.
     fn stepped(&self, shape: Shape, number: Number, step: f64) -> Shape {
         let period = self.side.period_s;
         match number {
@@ -266,7 +266,7 @@ impl<'a> Ready<'a> {
         }
     }
 
-    /// The numbers of a fit with their intervals.
+    /// The parameters of a fit with their intervals.
     pub(super) fn told(&self, fit: &Fit) -> Told {
         let moved: Vec<Number> = numbers(&fit.terms).into_iter().filter(|n| !self.at_an_end(fit.shape, *n)).collect();
         let columns = self.columns(&fit.terms, fit.shape);
@@ -324,7 +324,7 @@ impl<'a> Ready<'a> {
     }
 }
 
-/// The numbers of a fit with their intervals.
+/// The parameters of a fit with their intervals.
 pub(super) struct Told {
     pub(super) gains: Vec<Gain>,
     pub(super) offset: Estimate,
@@ -333,7 +333,7 @@ pub(super) struct Told {
     pub(super) force_delay_s: Option<Estimate>,
 }
 
-/// Which numbers of the shape a law depends on.
+/// Which parameters of the shape a law depends on.
 fn numbers(terms: &[Term]) -> Vec<Number> {
     let mut numbers = Vec::new();
     if terms.iter().any(|t| t.is_speed()) {

@@ -35,12 +35,12 @@ impl Term {
         }
     }
 
-    /// Whether it looks at a measured force.
+    /// Whether its input is a measured force.
     pub fn is_force(self) -> bool {
         matches!(self, Term::OtherForce | Term::OwnForce)
     }
 
-    /// Whether it looks at a speed, and so depends on how speeds are filtered.
+    /// Whether its input is a speed, so that it depends on how speeds are filtered.
     pub fn is_speed(self) -> bool {
         matches!(self, Term::Rate | Term::Damping | Term::Friction)
     }
@@ -55,9 +55,9 @@ pub struct Law {
     pub offset: f64,
     /// Time constant of the first-order filter of speeds, s.
     pub filter_s: f64,
-    /// Delay of the motions that the law looks at, s.
+    /// Delay of the motions in the law, s.
     pub delay_s: f64,
-    /// Delay of the forces that the law looks at, s.
+    /// Delay of the forces in the law, s.
     pub force_delay_s: f64,
     /// Speed above which the sign of a speed is sure, m/s or rad/s.
     pub sure_speed: f64,
@@ -72,7 +72,7 @@ impl Law {
     }
 }
 
-/// What a law looks at in one step.
+/// The inputs of a law in one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Seen {
     /// Own position, m or rad.

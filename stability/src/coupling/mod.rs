@@ -1,11 +1,11 @@
 //! The coupling of two devices, recovered from a recording: which law moves the two motors, with its gains.
 //!
-//! Each side by itself: the force of its motor is held against what a controller may look at, both positions and the measured forces. Candidates
-//! are the laws of bilateral control (Lawrence 1993; Hokayem and Spong 2006): position error with or without its rate, damping of the own motion,
-//! compensation of friction, reflected force, and four channels. Every candidate is fitted with the filter of its speeds and its delays as numbers of
-//! the fit, predicts blocks of time that its fit has not seen, and the simplest one wins that predicts no worse than the best.
+//! Each side by itself: the force of its motor is compared with what a controller may use, both positions and the measured forces. Candidates are the
+//! laws of bilateral control (Lawrence 1993; Hokayem and Spong 2006): position error with or without its rate, damping of the own motion,
+//! compensation of friction, reflected force, and four channels. Every candidate is fitted with the filter of its speeds and its delays as parameters
+//! of the fit, and predicts held-out blocks of time. The simplest one wins that predicts no worse than the best.
 //!
-//! What is looked at ends where the motion no longer tells the force (coherence), for above that a law would be fitted to the rounding of encoders.
+//! The band ends where the motion no longer determines the force (coherence), because above that a law would be fitted to the rounding of encoders.
 
 mod choose;
 mod filter;

@@ -9,16 +9,16 @@ use std::ops::Range;
 
 /// Blocks of time over which residuals count as independent, and by which held-out time is drawn.
 pub(super) const BLOCKS: usize = 20;
-/// More rows than this are not looked at: the piece with the most force is.
+/// More rows than this are not used: the piece with the most force is.
 const MOST_ROWS: usize = 60_000;
 /// A shorter recording holds no motion to fit, s.
 const LEAST_S: f64 = 1.0;
-/// Coherence below which a line says more of noise than of the law: where all noise is in what the law looks at, the law comes out too weak by one
-/// less the coherence (Bendat and Piersol, Random Data, 4th ed., 6.1).
+/// Coherence below which a line contains more noise than law. Where all noise is in the inputs of the law, the law is underestimated by one minus the
+/// coherence (Bendat and Piersol, Random Data, 4th ed., 6.1).
 const COHERENT: f64 = 0.9;
 /// No band ends below this, Hz.
 const LEAST_BAND_HZ: f64 = 5.0;
-/// A force counts as clamped where so many of its samples are at its largest size.
+/// A force counts as clamped where this share of its samples is at its largest size.
 const CLAMPED_SHARE: f64 = 0.005;
 
 /// One side of the pair.
@@ -97,7 +97,7 @@ impl Side {
         Ok(Side { period_s, force, own, other, own_force, other_force, blocks, kept, limit, band_hz, resolution, low_pass })
     }
 
-    /// Whether what a term looks at was recorded.
+    /// Whether the input of a term was recorded.
     pub(super) fn has(&self, term: Term) -> bool {
         match term {
             Term::OwnForce => self.own_force.as_ref().is_some_and(|f| deviation(f) > 0.0),
@@ -118,7 +118,7 @@ impl Side {
     }
 }
 
-/// The rows that are looked at: all, or of a long recording the piece with the most force.
+/// The rows that are used: all, or of a long recording the piece with the most force.
 fn most_force(force: &[f64]) -> Range<usize> {
     if force.len() <= MOST_ROWS {
         return 0..force.len();
@@ -146,11 +146,11 @@ fn clamp(force: &[f64]) -> Option<f64> {
     (largest > 0.0 && there >= 10 && there as f64 >= CLAMPED_SHARE * force.len() as f64).then_some(largest)
 }
 
-/// Up to which frequency what the law may look at tells the force, Hz.
+/// Upper limit of the band in which the possible inputs of the law determine the force, Hz.
 fn band(force: &[f64], own: &[f64], other: &[f64], forces: [Option<&[f64]>; 2], period_s: f64) -> f64 {
     let half = 0.5 / period_s;
     let error: Vec<f64> = other.iter().zip(own).map(|(r, x)| r - x).collect();
-    // A law of a speed is not told from a position that wanders, for that leaks over every line.
+    // A law of velocity cannot be identified from a position that drifts, because drift leaks over every line.
     let rate = |x: &[f64]| FilteredRate::of(x, 2.0 * period_s, period_s);
     let (error_rate, own_rate) = (rate(&error), rate(own));
     let mut columns: Vec<&[f64]> = vec![force, &error, own, &error_rate, &own_rate];
@@ -160,7 +160,7 @@ fn band(force: &[f64], own: &[f64], other: &[f64], forces: [Option<&[f64]>; 2], 
     let Some(spectra) = welch(&columns, std::slice::from_ref(&whole), segment, period_s, half) else { return half };
     let best = |line: usize| (1..columns.len()).map(|c| spectra.coherence(line, 0, c)).fold(0.0, f64::max);
     let all: Vec<f64> = (0..spectra.hz.len()).map(best).collect();
-    // A single line may lie in a notch: a tenth of the frequency to either side is looked at together.
+    // A single line may lie in a notch: a tenth of the frequency to either side is evaluated together.
     let smooth = |line: usize| {
         let wide = (line / 10).max(1);
         let piece = all.get(line.saturating_sub(wide)..(line + wide + 1).min(all.len())).unwrap_or_default();

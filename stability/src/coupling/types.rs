@@ -1,4 +1,4 @@
-//! What is looked at, and what is found.
+//! What is searched, and what is found.
 
 use super::law::{Law, Term};
 use crate::session::Session;
@@ -23,7 +23,7 @@ pub struct Signals<'a> {
     pub contact: Option<&'a [f64]>,
     /// F_h, force of the hand on the master, N or N m.
     pub hand: Option<&'a [f64]>,
-    /// Step of the position sensors, m or rad; 0 where there is none or nobody knows.
+    /// Step of the position sensors, m or rad; 0 where there is none or it is not known.
     pub resolution: f64,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Signals<'a> {
     }
 }
 
-/// Why no coupling can be told.
+/// Why no coupling can be identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoCoupling {
     /// Too little of it.
@@ -108,11 +108,11 @@ pub struct SideLaw {
     pub gains: Vec<Gain>,
     /// Added, N or N m.
     pub offset: Estimate,
-    /// Time constant of the filter of speeds, s; `None` where the law looks at no speed.
+    /// Time constant of the filter of speeds, s; `None` where the law uses no speed.
     pub filter_s: Option<Estimate>,
-    /// Delay of the motion that it looks at, s; `None` where it looks at no motion.
+    /// Delay of the motion in the law, s; `None` where it uses no motion.
     pub delay_s: Option<Estimate>,
-    /// Delay of the measured force that it looks at, s; `None` where it looks at none.
+    /// Delay of the measured force in the law, s; `None` where it uses none.
     pub force_delay_s: Option<Estimate>,
     /// Largest force, N or N m; `None` where no clamp acted.
     pub limit: Option<f64>,
@@ -120,7 +120,7 @@ pub struct SideLaw {
     pub unexplained: f64,
     /// RMS of what it leaves there, N or N m.
     pub left: f64,
-    /// Upper end of the band in which the motion tells the force, Hz: what is above is not looked at.
+    /// Upper end of the band in which the motion determines the force, Hz: higher frequencies are not used.
     pub band_hz: f64,
     /// Other laws, the best first.
     pub rivals: Vec<Rival>,
@@ -139,9 +139,9 @@ pub enum Kind {
     ForceReflection,
     /// Both motors act on positions and on measured forces.
     FourChannel,
-    /// One of the motors looks at nothing of the other side.
+    /// One of the motors uses nothing of the other side.
     OneWay,
-    /// Neither looks at the other side.
+    /// Neither uses the other side.
     Uncoupled,
     /// Another combination.
     Other,

@@ -4,7 +4,7 @@
 //! takes, `E_m(n) = -sum F_f(k) (x_m(k+1) - x_m(k))`: exact, for F_f is held from k to k+1. At the slave's, where F_s is sampled and
 //! not held, the trapezium: `E_s(n) = -sum (F_s(k) + F_s(k+1))/2 (x_s(k+1) - x_s(k))`. Negative: the port has given more than it took.
 //!
-//! Passivity is sufficient for a stable loop and not necessary: an active port on a master with friction may rest all the same.
+//! Passivity is sufficient for a stable loop and not necessary: an active port on a master with friction may rest nevertheless.
 
 mod bounds;
 mod environment;

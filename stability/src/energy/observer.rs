@@ -31,8 +31,8 @@ fn observe(force: &[f64], position: &[f64], mean: impl Fn(f64, f64) -> f64) -> V
     series
 }
 
-/// What rounding the position to `step` may have done to the observer of a held force by each row: summing by parts, the roundings
-/// e(k) enter as -F(n) e(n+1) + F(0) e(0) + sum e(k) (F(k) - F(k-1)), each with a standard deviation of step/sqrt(12). J.
+/// How far rounding the position to `step` may have changed the observer of a held force by each row. Summation by parts gives the effect of the
+/// roundings e(k) as -F(n) e(n+1) + F(0) e(0) + sum e(k) (F(k) - F(k-1)). Each e(k) has a standard deviation of step/sqrt(12). J.
 pub(super) fn rounding(force: &[f64], step: f64) -> Vec<f64> {
     let (mut squares, mut before, first) = (0.0, f64::NAN, force.iter().copied().find(|f| f.is_finite()).unwrap_or(0.0));
     force
@@ -96,8 +96,8 @@ mod tests {
     use backdrive_plant::elements::HystereticSpring;
     use backdrive_plant::elements::PathLaw;
 
-    /// A wall of stiffness k, sampled every T and held, and a hand that moves by x(t): over closed cycles the wall gives exactly
-    /// k/2 sum (dx)^2, which is k T/2 times the integral of v^2 but for terms of order T^2.
+    /// A wall of stiffness k, sampled every T and held, and a hand that moves by x(t). Over closed cycles the wall delivers exactly k/2 sum (dx)^2,
+    /// which is k T/2 times the integral of v^2 except for terms of order T^2.
     #[test]
     fn a_sampled_wall_gives_k_t_half_v_squared() {
         let (k, period_s, hz, amplitude, cycles) = (2000.0, 1e-3, 3.0, 4e-3, 6);

@@ -1,8 +1,8 @@
-//! What the energy method says.
+//! The result of the energy method.
 
 use serde::Serialize;
 
-/// What the energy method says of the session's own gain.
+/// The energy method's verdict on the session's own gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EnergyVerdict {
@@ -34,7 +34,7 @@ pub struct AxisEnergy {
     pub verdict: EnergyVerdict,
     /// Why.
     pub reason: String,
-    /// Times of every series below, s; every so many rows, and the last.
+    /// Times of every series below, s; one in several rows, and the last.
     pub time_s: Vec<f64>,
     /// The master's port: what the displayed environment took, without the dither's work.
     pub master: PortEnergy,
@@ -48,13 +48,13 @@ pub struct AxisEnergy {
     pub hold_s: f64,
     /// Rows without a value, which count as no work.
     pub missing_rows: usize,
-    /// What the master's elements took, by the model; empty where that cannot be told.
+    /// Energy that the master's elements absorbed, by the model; empty where it cannot be computed.
     pub elements: Vec<ElementEnergy>,
     /// RMS of the model's position against the measured one over the latter's RMS; `None` without a model run.
     pub model_misfit: Option<f64>,
     /// Why there are no elements; `None` where there are.
     pub elements_reason: Option<String>,
-    /// The classical bounds; `None` where they cannot be told.
+    /// The classical bounds; `None` where they cannot be computed.
     pub bounds: Option<Bounds>,
     /// Why there are none; `None` where there are.
     pub bounds_reason: Option<String>,

@@ -6,7 +6,7 @@ use backdrive_control::margins::{Margins, is_stable, margins};
 use nalgebra::Complex;
 use serde::Serialize;
 
-/// What the frequency response says about a gain.
+/// The frequency response's verdict on a gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -14,7 +14,7 @@ pub enum Verdict {
     Stable,
     /// It is not.
     Unstable,
-    /// The record does not tell.
+    /// The record gives no answer.
     CannotTell,
 }
 
@@ -25,7 +25,7 @@ pub struct FrequencyAnswer {
     pub gain: f64,
     /// Stable or not.
     pub verdict: Verdict,
-    /// Margins at this gain, of the worst loop at the worst amplitude; `None` where nothing is told.
+    /// Margins at this gain, of the worst loop at the worst amplitude; `None` where they are not known.
     pub margins: Option<Margins>,
     /// Critical mu*lambda; `None` where none was found.
     pub critical_gain: Option<f64>,
@@ -33,13 +33,13 @@ pub struct FrequencyAnswer {
     pub at_least: Option<f64>,
     /// 95 % interval of the critical gain, over all amplitudes where they differ; an open upper end is `None`.
     pub critical_gain_ci95: Option<(f64, Option<f64>)>,
-    /// Frequency on the edge, Hz; 0 where it runs away without oscillating.
+    /// Frequency at the stability limit, Hz; 0 for a run-away without oscillation.
     pub frequency_hz: Option<f64>,
-    /// Whether the edge depends on the amplitude.
+    /// Whether the stability limit depends on the amplitude.
     pub amplitude_dependent: bool,
     /// Why, in a sentence.
     pub reason: String,
-    /// What to record instead, where it cannot be told.
+    /// Which recording would give an answer, where this one does not.
     pub advice: Option<String>,
 }
 
@@ -71,7 +71,7 @@ impl Frequency {
         let all = self.levels.iter().map(|level| (level, margins_at(level, gain), level_verdict(level, gain)));
         let all: Vec<_> = all.collect();
         let worst = all.iter().map(|(_, m, _)| *m).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        // The margin is to the edge that is told, not to where single lines would have it.
+        // The margin refers to the reported stability limit, not to that of single lines.
         let to_edge = self.edge.gain.map(|edge| 20.0 * (edge / gain).log10());
         answer.margins = worst.map(|m| Margins { gain_db: to_edge, ..m });
         let of = |verdict: Verdict| all.iter().filter(move |a| a.2.0 == verdict).collect::<Vec<_>>();
@@ -91,7 +91,7 @@ impl Frequency {
     }
 }
 
-/// A number by which margins are compared: below 0 beyond the edge.
+/// A number by which margins are compared: below 0 above the stability limit.
 fn distance(m: &Margins) -> f64 {
     let beyond = m.phase_deg.is_some_and(|p| p < 0.0) || m.gain_db.is_some_and(|g| g < 0.0);
     if beyond { -m.modulus } else { m.modulus }
@@ -112,7 +112,7 @@ fn level_verdict(level: &LevelEstimate, gain: f64) -> (Verdict, String) {
         let most = told_to.unwrap_or(0.0);
         let reason =
             format!("beyond a gain of {most:.3} lines that are lost in noise, or what lies above the highest line, may hide an edge");
-        // An edge that is told lies below: then the noise does not matter.
+        // A known stability limit lies below: then the noise does not matter.
         if !ci95.and_then(|c| c.1).is_some_and(|high| gain > high) {
             return (Verdict::CannotTell, reason);
         }
@@ -140,7 +140,7 @@ fn level_verdict(level: &LevelEstimate, gain: f64) -> (Verdict, String) {
     }
 }
 
-/// Whether a gain beyond the first edge is stable nevertheless, by the winding of det(1 - kL), and not by a hair.
+/// Whether a gain above the first stability limit is stable nevertheless, by the winding of det(1 - kL), and with some margin.
 fn stable_again(level: &LevelEstimate, gain: f64) -> bool {
     let told = level.measured.told();
     let one = Complex::new(1.0, 0.0);

@@ -1,4 +1,4 @@
-//! One edge from those of all amplitudes, gains and states of contact, continued to rest and to large motions.
+//! One stability limit from those of all amplitudes, gains and states of contact, extrapolated to rest and to large motions.
 
 use super::edge::{self, Edge};
 use super::note::Note;
@@ -7,10 +7,10 @@ use crate::spectra::Window;
 use backdrive_control::margins::critical_factor;
 use nalgebra::Complex;
 
-/// Levels or gains whose edges differ by less are not told apart.
+/// Levels or gains whose stability limits differ by less are not distinguished.
 const SAME_EDGE: f64 = 0.05;
 
-/// Whether two edges lie apart by more than their uncertainty.
+/// Whether two stability limits differ by more than their uncertainty.
 fn apart(a: &Edge, b: &Edge) -> bool {
     let (Some((a_low, a_high)), Some((b_low, b_high))) = (a.interval(), b.interval()) else { return false };
     let above = |low: f64, high: Option<f64>| high.is_some_and(|high| low > high);
@@ -51,10 +51,10 @@ impl Frequency {
         }
     }
 
-    /// Widens the interval to where the edge goes beyond the largest dither, for an impact moves the master more than a dither may.
+    /// Widens the interval to the stability limit above the largest dither, because an impact moves the master more than a dither may.
     ///
-    /// What dry friction (and a hysteresis that has reached its limit) takes of a force of amplitude `d` is a share `c/d` of it, by
-    /// its describing function: so the edge tends to its limit as `1/d`, a straight line through the two largest amplitudes.
+    /// By its describing function, dry friction (and a hysteresis that has reached its limit) takes a share `c/d` of a force of amplitude `d`. The
+    /// stability limit therefore approaches its final value as `1/d`: a straight line through the two largest amplitudes.
     fn continue_to_large_amplitude(&mut self) {
         let mut levels: Vec<(f64, f64, f64)> = Vec::new();
         for level in &self.levels {
@@ -66,7 +66,7 @@ impl Frequency {
         if !(d2 > 1.2 * d1 && k2 > 0.0) {
             return;
         }
-        // A line through two points tells no more than a factor of three.
+        // A line through two points is not trusted beyond a factor of three.
         let limit = (k2 + (k2 - k1) * d1 / (d2 - d1)).clamp(k2 / 3.0, 3.0 * k2);
         if let Some((from, to)) = &mut self.edge.ci95 {
             *from = from.min(limit * low / k2);
@@ -75,10 +75,10 @@ impl Frequency {
         }
     }
 
-    /// Widens the interval to where the edge goes below the smallest dither, where something is cancelled.
+    /// Widens the interval to the stability limit below the smallest dither, where something is cancelled.
     ///
-    /// A master that dry friction holds does not move, and the canceller subtracts all the same: G_f is then 0, and what is left of
-    /// the way from F_f to x_c is the canceller's own response, measured as the difference of the two.
+    /// A master that dry friction holds does not move, but the canceller still subtracts. G_f is then 0, and the remaining path from F_f to x_c is
+    /// the canceller's own response, measured as the difference of the two.
     fn continue_to_rest(&mut self) {
         let largest = self.levels.iter().max_by(|a, b| a.amplitude_rms.total_cmp(&b.amplitude_rms));
         let Some((level, axis)) = largest.and_then(|level| Some((level, level.axes.first().filter(|_| level.axes.len() == 1)?))) else {
@@ -109,7 +109,7 @@ impl Frequency {
     }
 }
 
-/// The edge told best.
+/// The stability limit with the least uncertainty.
 fn sharpest(edges: &[Edge]) -> Edge {
     let width = |e: &Edge| match e.ci95 {
         Some((low, Some(high))) => (high / low).ln(),
@@ -119,7 +119,7 @@ fn sharpest(edges: &[Edge]) -> Edge {
     edges.iter().min_by(|a, b| width(a).total_cmp(&width(b))).copied().unwrap_or_default()
 }
 
-/// The lowest edge, with an interval over all of them.
+/// The lowest stability limit, with an interval over all of them.
 fn widest(edges: &[Edge]) -> Edge {
     let low = edges.iter().filter_map(|e| e.interval()).map(|i| i.0).min_by(f64::total_cmp);
     let open = edges.iter().any(|e| e.interval().is_none_or(|i| i.1.is_none()));

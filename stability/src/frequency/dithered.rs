@@ -232,7 +232,7 @@ fn loop_of(
     };
     let slave = match options.parts.slave {
         Some(files) => Some(Loop::known(&motion.hz, swap::slave_response(files, &tips(prepared, stretches), &motion.hz)?)),
-        // The slave side is driven by its command alone, so whatever moves the command tells it.
+        // The slave side is driven by its command alone, so any signal that moves the command identifies it.
         None => by(Column::Contact, Column::Command, &columns(axes, Column::Command), MOVED)
             .map(|f| Loop::measured(&f, options.draws, options.seed + 1)),
     };

@@ -1,4 +1,4 @@
-//! Where the edge of a measured loop lies, with an interval.
+//! The stability limit of a measured loop, with an interval.
 
 use super::local::LocalFit;
 use backdrive_control::margins::{Crossing, at_the_bottom, between};
@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 type Matrix = DMatrix<Complex<f64>>;
 
-/// A line tells where the loop is if `|L|` is this many times its sigma; noise is so large on 3 lines in 10000.
+/// A line locates the loop if `|L|` is this many times its sigma; noise is that large on 3 lines in 10000.
 pub(super) const TOLD: f64 = 4.0;
 /// Radius, in sigmas of one component, of the disc that holds 95 %.
 const DISC: f64 = 2.448;
@@ -19,27 +19,26 @@ const DISC: f64 = 2.448;
 const LARGEST: f64 = 1e4;
 /// Half-width that stays where there is no noise: lines are interpolated, records rounded.
 const FLOOR: f64 = 0.003;
-/// Below this the lowest line is near enough to DC to tell which way the loop runs away, Hz.
+/// Below this the lowest line is near enough to DC to decide in which direction the loop runs away, Hz.
 const NEAR_DC_HZ: f64 = 8.0;
 
-/// The gain at which a loop is on its edge.
+/// The gain at which a loop is at its stability limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Edge {
-    /// mu*lambda (or multiples of the recorded gain, where that is unknown); `None` where no line reaches the edge.
+    /// mu*lambda (or multiples of the recorded gain, where that is unknown); `None` where no line reaches the stability limit.
     pub gain: Option<f64>,
-    /// 95 % interval of the edge; over several amplitudes the upper end is `None` where one of them has no edge.
+    /// 95 % interval of the stability limit; over several amplitudes the upper end is `None` where one of them has no limit.
     pub ci95: Option<(f64, Option<f64>)>,
     /// Frequency at which it oscillates there, Hz; 0 where it runs away without oscillating.
     pub frequency_hz: Option<f64>,
-    /// Where no edge was found: below this gain there is none within the lines, by their discs of 95 %; at most 10000.
+    /// Where no stability limit was found: there is none below this gain within the lines, by their discs of 95 %; at most 10000.
     pub at_least: Option<f64>,
-    /// Up to this gain neither a line at which the loop is lost in noise nor what lies above the highest line can hide an edge;
-    /// `None`: up to any.
+    /// Up to this gain no stability limit can be hidden by a line with too much noise or by frequencies above the highest line; `None`: at any gain.
     pub told_to: Option<f64>,
 }
 
 impl Edge {
-    /// The whole interval in which the edge may lie: lower and upper end, the upper `None` where it is open.
+    /// The whole interval in which the stability limit may lie: lower and upper end, the upper `None` where it is open.
     pub fn interval(&self) -> Option<(f64, Option<f64>)> {
         self.ci95.or(self.at_least.map(|least| (least, None)))
     }
@@ -120,7 +119,7 @@ impl Loop {
         (s.iter().map(|x| x * x).sum::<f64>() / s.nrows().max(1) as f64).sqrt()
     }
 
-    /// Whether each line tells where the loop is.
+    /// Whether each line locates the loop.
     pub(super) fn told(&self) -> Vec<bool> {
         (0..self.hz.len())
             .map(|line| {
@@ -130,7 +129,7 @@ impl Loop {
             .collect()
     }
 
-    /// The edge; `other` is the same loop estimated with another resolution: what differs is bias.
+    /// The stability limit; `other` is the same loop estimated with another resolution: the difference is bias.
     pub(super) fn edge(&self, other: Option<&Loop>) -> Edge {
         let told = self.told();
         let told_to = [self.bound(|line| !told[line]), self.above_the_band()].into_iter().flatten().min_by(f64::total_cmp);
@@ -199,7 +198,7 @@ fn student(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(6.5, |t| t.inverse_cdf(0.975) / 1.959_964)
 }
 
-/// The smallest factor at which an eigenvalue of the loop passes through +1, over the lines that tell something.
+/// The smallest factor at which an eigenvalue of the loop passes through +1, over the lines with information.
 pub(crate) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossing> {
     let mut best: Option<Crossing> = None;
     let mut keep = |c: Option<Crossing>| {
@@ -231,7 +230,7 @@ pub(crate) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossi
     best
 }
 
-/// The loci of the eigenvalues over the lines that tell something.
+/// The loci of the eigenvalues over the lines with information.
 pub(super) fn loci(l: &[Matrix], told: &[bool]) -> Vec<Vec<Complex<f64>>> {
     let mut loci: Vec<Vec<Complex<f64>>> = Vec::new();
     let mut before: Option<Vec<Complex<f64>>> = None;

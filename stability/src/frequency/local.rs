@@ -1,11 +1,10 @@
 //! Transfer functions against an instrument, smooth over neighbouring lines.
 //!
-//! `y = R u + e`, where `u` and `e` are correlated (the loop is closed) and the instrument `d` and `e` are not:
-//! `S_yd = R S_ud`. About each line `R` is taken as a quadratic in frequency over a window of lines (also mirrored ones, of
-//! negative frequency, where `R` is conjugate), and solved for by least squares over the window. With as many inputs as
-//! instruments this also separates inputs whose excitations are coherent at each line but not over several.
-//! What is left, `e = y - R u`, gives the noise: its scatter over averages, or, where that is larger, what the smooth `R`
-//! leaves in the averages themselves (nonlinear distortion repeats with the excitation and does not scatter).
+//! `y = R u + e`, where `u` and `e` are correlated (the loop is closed) and the instrument `d` and `e` are not: `S_yd = R S_ud`. About each line `R`
+//! is a quadratic in frequency over a window of lines, and is solved for by least squares over the window. The window also has mirrored lines, of
+//! negative frequency, where `R` is conjugate. With as many inputs as instruments this also separates inputs whose excitations are coherent at each
+//! line but not over several. The residual `e = y - R u` gives the noise: its scatter over averages, or, where that is larger, the residual of the
+//! smooth `R` in the averages themselves (nonlinear distortion repeats with the excitation and does not scatter).
 
 use crate::spectra::{CrossSpectra, Window};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
@@ -22,7 +21,7 @@ const POOLED: usize = 6;
 pub(super) const DITHERED: f64 = 1e-4;
 /// The same of a hand, or of a command, whose power falls steeply with frequency: 100 dB.
 pub(super) const MOVED: f64 = 1e-10;
-/// Estimates lie no closer than this share of their frequency: what is smooth need not be told more often.
+/// Estimates lie no closer than this share of their frequency: a smooth response needs no more.
 const SPACING: f64 = 0.005;
 /// Of the noise of one line with the next, Hann window: `(2/3)^2`; as a moving average of two.
 const NEXT_LINE: f64 = 0.61;
@@ -80,7 +79,7 @@ pub(super) fn shaken(spectra: &CrossSpectra, instruments: &[usize], least_power:
 
 /// Estimates a transfer matrix. `narrow` divides the width of the windows: what changes with it is bias.
 ///
-/// `None` where too few lines are shaken, or the inputs cannot be told apart.
+/// `None` where too few lines are excited, or the inputs cannot be separated.
 pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Option<LocalFit> {
     let Columns { outputs, inputs, instruments, least_power } = columns;
     let (ny, nu) = (outputs.len(), inputs.len());

@@ -1,9 +1,8 @@
 //! Is the loop stable? From its frequency response, from the data alone.
 //!
-//! Force is fed back, so force and motion are correlated both ways round the loop: what the dither `d` (recorded, exogenous)
-//! has in common with each of them tells them apart. With `F_f = d + r`, `r` the reflected part, the loop is
-//! `L = S_rd / S_fd`, per unit of gain; it holds every hop, delay and sampler as it was. The gain on the edge is where an
-//! eigenvalue of `k L(jw)` passes through `+1`.
+//! Force is fed back, so force and motion are correlated both ways round the loop. Their cross-spectra with the dither `d` (recorded, exogenous)
+//! separate them. With `F_f = d + r`, `r` the reflected part, the loop is `L = S_rd / S_fd`, per unit of gain. It contains every hop, delay and
+//! sampler of the recorded loop. The critical gain is where an eigenvalue of `k L(jw)` passes through `+1`.
 
 mod answer;
 mod conclude;

@@ -10,17 +10,17 @@ pub enum Note {
     LambdaFromSignals {
         /// What they say.
         lambda: f64,
-        /// F_f follows F_s by so many rows.
+        /// F_f follows F_s by this number of rows.
         lag: usize,
     },
     /// mu, from the signals.
     MuFromSignals {
         /// What they say.
         mu: f64,
-        /// x_c follows x_m by so many rows.
+        /// x_c follows x_m by this number of rows.
         lag: usize,
     },
-    /// Neither was recorded, and the signals do not tell them.
+    /// Neither was recorded, and the signals do not determine them.
     GainsUnknown,
     /// The hand moves throughout the contact.
     HandNeverRests,
@@ -41,18 +41,18 @@ pub enum Note {
     },
     /// The operator's intent took the dither's place.
     NoDither,
-    /// Edges from different recorded gains differ.
+    /// Stability limits from different recorded gains differ.
     GainsDisagree,
-    /// Edges at different amplitudes differ.
+    /// Stability limits at different amplitudes differ.
     AmplitudeDependent,
-    /// The interval reaches to where the edge goes at large amplitudes.
+    /// The interval extends to the stability limit at large amplitudes.
     ContinuedToLarge {
-        /// That edge.
+        /// That stability limit.
         gain: f64,
     },
-    /// The interval reaches to where the edge is while friction holds the master.
+    /// The interval extends to the stability limit while friction holds the master.
     ContinuedToRest {
-        /// That edge.
+        /// That stability limit.
         gain: f64,
     },
 }

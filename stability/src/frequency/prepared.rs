@@ -1,4 +1,4 @@
-//! A session made ready: gains that nobody recorded, the columns of all axes, and what to record with.
+//! A session made ready: gains that were not recorded, the columns of all axes, and what to record with.
 
 use super::FrequencyError;
 use super::note::Note;
@@ -51,7 +51,7 @@ pub(super) fn check_shape(session: &Session) -> Result<(), FrequencyError> {
     good.then_some(()).ok_or_else(|| FrequencyError::Shape(session.name.clone()))
 }
 
-/// Gains that nobody recorded, from the signals; says whether they stay unknown.
+/// Fills in gains that were not recorded, from the signals; returns whether they stay unknown.
 pub(super) fn complete_gains(session: &mut Session, notes: &mut Vec<Note>) -> bool {
     let missing = |column: &[f64]| column.iter().all(|x| !x.is_finite());
     let n = session.len();

@@ -1,4 +1,4 @@
-//! Which rows of a session tell something about its loop, in which state.
+//! Which rows of a session have information about its loop, in which state.
 
 use crate::session::{AxisSignals, Session};
 use serde::Serialize;
@@ -71,7 +71,7 @@ pub(super) struct Rows {
     pub hand_moves: bool,
 }
 
-/// Bridges short gaps of every column; says how many rows that are, in any column.
+/// Bridges short gaps of every column; returns how many rows these are, in any column.
 pub(super) fn bridge(session: &mut Session) -> usize {
     let mut bridged = vec![false; session.len()];
     for axis in &mut session.axes {
@@ -103,7 +103,7 @@ fn bridge_column(column: &mut [f64], bridged: &mut [bool]) {
     }
 }
 
-/// The rows in which the loop is closed through a contact, shaken by its dither, and otherwise left alone.
+/// The rows in which the loop is closed through a contact, excited by its dither, and without other disturbances.
 pub(super) fn usable(session: &Session) -> Rows {
     let n = session.len();
     let mut rows = Rows { count: RowCount { all: n, ..RowCount::default() }, ..Rows::default() };
@@ -116,7 +116,7 @@ pub(super) fn usable(session: &Session) -> Rows {
     let knows_intent = session.axes.iter().any(|a| a.intent.is_some());
     rows.hand_moves = knows_intent && !known_rest;
     let settle = (SETTLE_S / session.period_s).round() as usize;
-    // Nobody knows what was before the first row.
+    // The state before the first row is not known.
     let mut settled_from = settle;
     let mut open: Option<Stretch> = None;
     for row in 0..n {
@@ -274,7 +274,7 @@ fn levels(amplitude: &[f64], period_s: f64) -> (Vec<f64>, Vec<Option<usize>>) {
     let level_of = (0..n)
         .map(|row| {
             let a = amplitude[row];
-            // Of one level only, every row that is shaken counts.
+            // Of one level only, every row with dither counts.
             let counts = if several { settled[row] } else { a > 0.3 * joined.first().map_or(f64::INFINITY, |g| g.0) };
             let level = joined.iter().position(|g| !several || (a >= 0.99 * g.0 && a <= 1.01 * g.1))?;
             counts.then_some(level)

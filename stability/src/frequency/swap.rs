@@ -13,7 +13,7 @@ use backdrive_plant::model::{InputKind, Output, OutputKind};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-/// Parts to put in the place of those that recorded the session.
+/// Parts that replace those that recorded the session.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ExchangedParts<'a> {
     /// Another canceller: its model with grip (no model: nothing is cancelled), the corner of its high-pass, Hz (0: none), and how it
@@ -40,7 +40,7 @@ pub enum PartError {
     /// A device has no model.
     #[error("{0}: has no model to take the response from; give a model file")]
     NoModel(&'static str),
-    /// A controller drives the slave, and its answer is not told from the model alone.
+    /// A controller drives the slave, and the model alone does not determine its response.
     #[error("slave: a controller drives it, so that its response does not follow from its model alone; run the graph with it instead")]
     Driven,
     /// What the slave touches is at a point of it.

@@ -1,4 +1,4 @@
-//! Small sampled loops whose edge is known exactly.
+//! Small sampled loops whose critical gain is known exactly.
 
 use super::*;
 use crate::session::AxisSignals;
@@ -188,7 +188,7 @@ impl Setup {
     }
 }
 
-/// Errors of the edge and how often its interval holds the truth, over seeds.
+/// Errors of the stability limit and how often its interval holds the truth, over seeds.
 fn coverage(setups: impl Iterator<Item = Setup>) -> (f64, f64, f64) {
     let (mut worst, mut inside, mut count, mut squares, mut widths) = (0.0_f64, 0.0, 0.0, 0.0, Vec::new());
     for s in setups {
@@ -278,7 +278,7 @@ fn the_laws_of_cancelling_hold() {
     let none = setup();
     let bare = none.edge().0;
     for eps in [1.0 / 3.0, 0.1] {
-        // Recorded at one gain, whatever is cancelled; the edge is 1/eps away.
+        // Recorded at one gain, whatever is cancelled; the stability limit is 1/eps away.
         let s = Setup { cancelled: 1.0 - eps, lambda: 0.4 * bare, ..none.clone() };
         let edge = s.answer().edge;
         assert!((edge.gain.unwrap() * eps / bare - 1.0).abs() < 0.02, "{eps}: {edge:?} {bare}");
@@ -381,7 +381,7 @@ fn operator_motion_alone_cannot_tell() {
     s.wall_from = rows / 2;
     let smooth = Setup { hand: Some(hand(rows, false)), ..s.clone() };
     assert_eq!(smooth.answer().at(0.5 * truth).verdict, Verdict::CannotTell);
-    // Nobody recorded the intent.
+    // The intent was not recorded.
     let mut session = s.record();
     session.axes[0].intent = None;
     let unknown = analyse(&session, &Options::default()).unwrap().at(0.5 * truth);
@@ -499,7 +499,7 @@ fn coupled_axes_have_the_edge_of_their_closed_loop() {
     let edge = found.edge;
     assert!((edge.gain.unwrap() / truth - 1.0).abs() < 0.02, "{edge:?} {truth}");
     assert_eq!((found.at(0.9 * truth).verdict, found.at(1.1 * truth).verdict), (Verdict::Stable, Verdict::Unstable));
-    // One loop alone, the other's force open: another edge, which the diagonal of the matrix has.
+    // One loop alone, the other's force open: another critical gain, that of the diagonal of the matrix.
     let alone: Vec<f64> = found.levels[0].axes.iter().map(|a| a.edge.gain.unwrap()).collect();
     assert!(alone.iter().any(|k| (k / truth - 1.0).abs() > 0.02), "coupling does nothing: {alone:?} {truth}");
 }

@@ -30,15 +30,15 @@ impl Default for Options<'_> {
 pub struct Frequency {
     /// One estimate for each amplitude of the dither, and for each set of axes that touch.
     pub levels: Vec<LevelEstimate>,
-    /// The edge from each recorded gain alone, where there are several.
+    /// The stability limit from each recorded gain alone, where there are several.
     pub gains: Vec<GainEstimate>,
-    /// The edge from all of it: an interval over the amplitudes where it depends on them.
+    /// The stability limit from all data: an interval over the amplitudes where it depends on them.
     pub edge: Edge,
-    /// Edges at different amplitudes differ by more than their uncertainty: friction, hysteresis or backlash.
+    /// Stability limits at different amplitudes differ by more than their uncertainty: friction, hysteresis or backlash.
     pub amplitude_dependent: bool,
-    /// Edges from different recorded gains differ by more than their uncertainty.
+    /// Stability limits from different recorded gains differ by more than their uncertainty.
     pub gains_disagree: bool,
-    /// Gains are multiples of the recorded one, for nobody recorded it and the signals do not tell.
+    /// Gains are multiples of the recorded one, because it was not recorded and the signals do not determine it.
     pub relative: bool,
     /// What delays the loop beside its devices.
     pub delays: Delays,
@@ -46,17 +46,17 @@ pub struct Frequency {
     pub provenance: Provenance,
     /// Which rows were used, and why others were not.
     pub rows: RowCount,
-    /// The method and its numbers, for a reader.
+    /// The method and its settings, for a reader.
     pub method: String,
     /// What a reader has to know.
     pub notes: Vec<Note>,
-    /// Why nothing can be told.
+    /// Why there is no answer.
     pub cannot_tell: Option<CannotTell>,
     /// What to record for a better answer.
     pub advice: String,
 }
 
-/// Why the record does not tell.
+/// Why the record gives no answer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct CannotTell {
     /// In a sentence.
@@ -91,11 +91,11 @@ pub struct LevelEstimate {
     pub hz: Vec<f64>,
     /// Each axis, the loops of the others open.
     pub axes: Vec<AxisEstimate>,
-    /// Loci of the eigenvalues of the loop per unit gain at the lines that tell something; of one axis its `l`. `[re, im]`.
+    /// Loci of the eigenvalues of the loop per unit gain at the lines with information; of one axis its `l`. `[re, im]`.
     pub loci: Vec<Vec<[f64; 2]>>,
     /// The lines of the loci, Hz.
     pub loci_hz: Vec<f64>,
-    /// Edge of all loops together.
+    /// Stability limit of all loops together.
     pub edge: Edge,
     #[serde(skip)]
     pub(super) measured: Loop,
@@ -120,7 +120,7 @@ pub struct AxisEstimate {
     pub motion: Response,
     /// H_se, from x_c to F_s, N/m or N m/rad.
     pub h_se: Response,
-    /// Edge of this loop alone.
+    /// Stability limit of this loop alone.
     pub edge: Edge,
 }
 
@@ -133,7 +133,7 @@ pub struct Response {
     pub sigma: Vec<f64>,
 }
 
-/// The edge from one recorded gain.
+/// The stability limit from one recorded gain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainEstimate {
     /// Position scale.

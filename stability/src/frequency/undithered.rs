@@ -1,8 +1,8 @@
 //! The loop without a dither: only the operator shook it.
 //!
-//! `x_m = G_u x_u + G_f F_f`, and in contact `F_f` follows `x_m`. Where the intent is all that acts, intent and force are fully
-//! coherent, and what comes out for `G_f` is `1/(lambda H_se)` or nothing. Free motion breaks that: there the force is 0 and
-//! `G_u` is told alone. So both are needed, broad-band, and the intent must be recorded.
+//! `x_m = G_u x_u + G_f F_f`, and in contact `F_f` follows `x_m`. Where the intent is all that acts, intent and force are fully coherent, and the
+//! estimate of `G_f` is `1/(lambda H_se)` or nothing. Free motion breaks that: there the force is 0 and `G_u` is identified alone. So both are
+//! needed, broad-band, and the intent must be recorded.
 
 use super::AxisEstimate;
 use super::dithered::{delays, on_lines};
@@ -15,12 +15,12 @@ use crate::spectra::{CrossSpectra, welch};
 use nalgebra::Complex;
 use std::ops::Range;
 
-/// Share of the force's power that must not follow from the intent for the two to be told apart.
+/// Share of the force's power that must be independent of the intent for the two to be separable.
 const LEAST_FREEDOM: f64 = 0.02;
 /// By how much that part must exceed what contact alone leaves (noise that the loop has fed back).
 const ABOVE_NOISE: f64 = 20.0;
 
-/// Answers from the operator's motion, or says why not.
+/// Answers from the operator's motion, or records why not.
 pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequency) -> Result<(), FrequencyError> {
     let cannot = |reason: &str, result: &mut Frequency| {
         result.cannot_tell = Some(CannotTell { reason: reason.to_string(), advice: Some(result.advice.clone()) });
@@ -179,7 +179,7 @@ fn second_input(hz: &[f64], found: Option<&LocalFit>) -> Response {
     response
 }
 
-/// Whether force and intent are told apart at a line: by free motion, and not by noise that went round the loop.
+/// Whether force and intent are separable at a line: by free motion, and not by noise that went round the loop.
 fn told_apart(all: &CrossSpectra, touching: &CrossSpectra, line: usize, intent: usize, force: usize) -> bool {
     let left = |s: &CrossSpectra| {
         let m = &s.lines[line];

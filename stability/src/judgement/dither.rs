@@ -6,7 +6,7 @@ use crate::outcome::{LOWEST_HZ, NOISE, Outcome, Trace};
 use crate::spectra::welch;
 use backdrive_signal::statistics::rms;
 
-/// Of the spectra that tell a dither's share, s.
+/// Of the spectra that give a dither's share, s.
 const SEGMENT_S: f64 = 0.5;
 
 /// Pieces of a hold in which the dither keeps its level: one whose level rises makes the master move more, which is no growth of the loop's.
@@ -51,7 +51,7 @@ pub(super) fn dithered(trace: &Trace, from: usize, to: usize) -> Option<f64> {
     (all > 0.0).then(|| unexplained / all)
 }
 
-/// Whether a master that a dither shakes runs away underneath: the mean of each quarter lies farther from the one before.
+/// Whether the mean position of a master with dither runs away: the mean of each quarter lies farther from the one before.
 pub(super) fn judge_drift(trace: &Trace, from: usize, to: usize) -> Outcome {
     let piece = &trace.position[from..to];
     let quarter = piece.len() / 4;

@@ -12,7 +12,7 @@ const LEAST_SAMPLES: usize = 16;
 /// A loop that bounces off what it touches touches it again within this, s.
 const BRIDGED_S: f64 = 0.05;
 
-/// Where nobody recorded what the hand wants, it counts as holding on while the slave is in contact; pieces of rows, short losses of contact bridged.
+/// Where the hand's intent was not recorded, it counts as holding on while the slave is in contact; pieces of rows, short losses of contact bridged.
 fn in_contact(trace: &Trace, rows: usize) -> Vec<bool> {
     let bridged = (BRIDGED_S / trace.period_s) as usize;
     let mut held = vec![trace.closes == Closes::Always; rows];

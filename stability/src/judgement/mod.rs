@@ -1,4 +1,4 @@
-//! One judgement of a run, for live runs, replays, predictions, bags and other people's recordings alike: [`judge`]. What it goes by:
+//! One judgement of a run, for live runs, replays, predictions, bags and other people's recordings alike: [`judge`]. Its criteria:
 //!
 //! | fact | threshold |
 //! |---|---|
@@ -8,9 +8,9 @@
 //! | it dies | its last quarter below 0.7 of its first, its envelope falling by more than 0.2 per second; and its last quarter below 0.94 of the third, or its later half falling as fast |
 //! | it grows | its last quarter above 1.5 of its first, its envelope rising by more than 0.2 per second: unstable |
 //! | otherwise | a limit cycle |
-//! | nobody recorded the hand | it counts as holding on while the slave touches something, losses of 50 ms bridged; only what is above 10.4 Hz is the loop's, or regular in the forces above 8 Hz |
+//! | the hand was not recorded | it counts as holding on while the slave touches something, losses of 50 ms bridged; only what is above 10.4 Hz is the loop's, or regular in the forces above 8 Hz |
 //! | slow motion | the last quarter spans more than 20 um and four encoder steps, and does not settle; four swings or more die or grow as above, by their later half |
-//! | forces | where the position shows nothing, and four steps of its sensor are more than 20 um or the slave moves by more than they are: a force that swings regularly (sizes and periods vary by less than 0.35) by more than 5 % of its largest in the hold, 1 % of its largest in the run, and 0.05 N (0.005 N m) |
+//! | forces | where the position shows nothing, and four steps of its sensor are more than 20 um or less than the slave's motion. The force swings regularly (sizes and periods vary by less than 0.35), by more than 5 % of its largest in the hold, 1 % of its largest in the run, and 0.05 N (0.005 N m) |
 //! | limited | a clamp acted in more than 1 % of the contact (of a loop that is always closed: or of the holds), or the master left its travel; of a loop that is always closed a limit cycle comes first |
 //! | a noisy sensor | its noise adds 5 standard deviations to what an amplitude and 10 to what a span must exceed |
 //! | the hand never holds still | of a loop that is always closed: whether every oscillation that the motion stirs dies (`moving`) |
@@ -86,7 +86,7 @@ fn share_clamped_at_rest(trace: &Trace) -> f64 {
     }
 }
 
-/// By its holds; of a pair whose hand never holds still, or whose hand nobody recorded, by what it does while the hand moves.
+/// By its holds; of a pair whose hand never holds still, or whose hand was not recorded, by what it does while the hand moves.
 fn while_closed(trace: &Trace, always: bool) -> (Option<Outcome>, Option<Decay>) {
     let known = !trace.intent.is_empty();
     if known || !always {
@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(judge(&free(&|_| 0.005)), Outcome::Stable);
         let cycle = judge(&free(&|t| 0.005 + 2e-4 * sine(t)));
         assert_eq!(cycle.to_string(), "limit cycle of ±0.200 mrad at 60.0 Hz");
-        // At its motor's limit it is never stable, and what shakes says more than the limit.
+        // At its motor's limit it is never stable, and the oscillating signal is more informative than the limit.
         let clamped = |position: &dyn Fn(f64) -> f64| judge(&Trace { clamped: vec![true; 10_000], ..free(position) }).word();
         assert_eq!((clamped(&|_| 0.005), clamped(&|t| 0.005 + 2e-4 * sine(t))), ("limited", "limit_cycle"));
     }

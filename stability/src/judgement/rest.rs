@@ -28,20 +28,20 @@ pub(super) fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcom
     }
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ);
     let fast = found.as_ref().map_or(Outcome::Stable, |found| judge_fast(found, trace));
-    // Where nobody recorded what the hand wants, what is slow is the hand's own, and a quick hand has lines at the lowest frequency looked at.
+    // Where the hand's intent was not recorded, slow motion is the hand's own, and a quick hand has lines at the lowest frequency of interest.
     if trace.intent.is_empty() {
         let by_hand = found?.frequency_hz < BEYOND_THE_HAND * LOWEST_HZ;
         let by_position = if by_hand { Outcome::Stable } else { fast };
         return Some(if by_position == Outcome::Stable { judge_force(trace, from, to) } else { by_position });
     }
     let slow = judge_slow(trace, from, to);
-    // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
+    // The ends of a slow drift have lines at every frequency, the strongest of them at the lowest.
     let spills_over = found.is_some_and(|f| f.frequency_hz < 1.5 * LOWEST_HZ) && slow != Outcome::Stable;
     let by_position = if fast == Outcome::Stable || spills_over { slow } else { fast };
     Some(if by_position == Outcome::Stable { judge_force(trace, from, to) } else { by_position })
 }
 
-/// Up to here the position says nothing, m or rad: half a peak-to-peak.
+/// Up to this level the position shows nothing, m or rad: half a peak-to-peak.
 fn floor(trace: &Trace) -> f64 {
     LEAST_AMPLITUDE.max(STEPS * trace.resolution) + NOISE * trace.noise
 }
@@ -60,8 +60,8 @@ pub(super) fn judge_fast(found: &Oscillation, trace: &Trace) -> Outcome {
     }
 }
 
-/// Whether the master comes to rest while the hand holds still: a loop of a low rate oscillates slowly, and one whose canceller takes out too much
-/// at DC, or that sticks and slips, wanders and may never oscillate at a frequency of its own. With the hand still any frequency is the loop's.
+/// Whether the master comes to rest while the hand holds still. A loop of a low rate oscillates slowly. One whose canceller subtracts too much at DC,
+/// or that sticks and slips, drifts and may never oscillate at a frequency of its own. With the hand still any frequency is the loop's.
 fn judge_slow(trace: &Trace, from: usize, to: usize) -> Outcome {
     let piece = &trace.position[from..to];
     let quarter = piece.len() / 4;

@@ -19,7 +19,7 @@ pub(super) struct Line {
 const PIECE_S: f64 = 1.0;
 /// Tapers.
 const TAPERS: usize = 6;
-/// A line goes on where it is seen in so many pieces in a row: two seconds and a half.
+/// A line continues where it is seen in this number of consecutive pieces: two seconds and a half.
 const IN_A_ROW: usize = 4;
 /// Chance that a piece without a line shows one, over all of its frequencies.
 const CHANCE: f64 = 0.05;

@@ -1,9 +1,10 @@
 //! What a coupled pair does while the hand moves: whether every oscillation that the motion stirs up dies, and how fast.
 //!
-//! A pair of motors that act on each other's positions is a closed loop all the time, and its hand need never hold still. What the hand does is slow
-//! and unknown; what the loop makes of it above that is a sum of its modes. They are told by an autoregressive model of the motion (output-only modal
-//! analysis; Neumaier and Schneider 2001), of the order that Schwarz's criterion takes, and each decay has the interval that the model's coefficients
-//! leave it (their covariance a sandwich over twenty blocks of time, carried on to the pole by its derivatives). The same is done in bands, one above the other, of the coupling error and of the master.
+//! A pair of motors that act on each other's positions is a closed loop all the time, and its hand need never hold still. What the hand does is slow and
+//! unknown; what the loop makes of it above that is a sum of its modes. They are identified by an autoregressive model of the motion (output-only modal
+//! analysis; Neumaier and Schneider 2001), of the order that Schwarz's criterion selects. The interval of each decay follows from the covariance of the model's
+//! coefficients, a sandwich over twenty blocks of time. Derivatives propagate it to the pole. The same is done in bands, one above the other, of the coupling
+//! error and of the master.
 //!
 //! | fact | threshold |
 //! |---|---|
@@ -171,8 +172,8 @@ fn decimated(signal: &[f64], every: usize) -> Vec<f64> {
     kept.windows(2).filter_map(|w| Some(w.get(1)? - w.first()?)).collect()
 }
 
-/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate; twelve of its periods long to either side, so that it is flat
-/// up to four fifths of its corner.
+/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate. It is twelve of its periods long to either side, so that it is
+/// flat up to four fifths of its corner.
 fn low_pass(signal: &[f64], corner: f64) -> Vec<f64> {
     use std::f64::consts::PI;
     let half = (12.0 / corner).ceil() as i64;

@@ -1,12 +1,13 @@
-//! The loops of several axes together, told from the models: the generalised Nyquist criterion.
+//! The loops of several axes together, computed from the models: the generalised Nyquist criterion.
 //!
-//! With `L(jω)` the matrix of the loops per unit of gain, from the forces on the master round to the reflected ones, and `k` = μλ, the closed loop is stable
-//! where `det(I - k L(jω))` does not wind about 0 from -∞ to ∞; `L` itself is stable, for its parts are. The same is said by the eigenvalues of `k L`, the
-//! eigenloci, which must not encircle +1 taken together (A. MacFarlane and I. Postlethwaite, Int. J. Control 25 (1977) 81-127; proven by C. Desoer and
-//! Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have -1.
+//! `L(jω)` is the matrix of the loops per unit of gain, from the forces on the master round to the reflected ones, and `k` = μλ. The closed loop is stable
+//! where `det(I - k L(jω))` does not wind about 0 from -∞ to ∞; `L` itself is stable, because its parts are. An equivalent condition uses the eigenvalues of
+//! `k L`, the eigenloci, which must not encircle +1 taken together (A. MacFarlane and I. Postlethwaite, Int. J. Control 25 (1977) 81-127; proven by C.
+//! Desoer and Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have
+//! -1.
 //!
-//! Where an axis is looked at alone, the others open, its loop is the element on the diagonal. **That each of these is stable says nothing of all of them
-//! closed**: what an axis does to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
+//! Where an axis is analysed alone, the others open, its loop is the element on the diagonal. **Even if each of these is stable, all of them closed may
+//! not be**: the path from one axis to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
 //! they are not together.
 //!
 //! The models are linear here, about their pose and about the contact that was recorded; dry friction is left out, whose loss makes a loop more stable.
@@ -50,7 +51,7 @@ pub struct CoupledLoops {
     pub together: Limit,
     /// Each closed alone, the others open: name of the axis and its limit.
     pub alone: Vec<(String, Limit)>,
-    /// How often the eigenloci encircle +1 clockwise at the gain asked: so many poles are unstable. 0 where it is stable.
+    /// How often the eigenloci encircle +1 clockwise at the gain asked: the number of unstable poles. 0 where it is stable.
     pub encirclements: i64,
     /// Axes that touched something in the recording; the models are those of that contact.
     pub touched: Vec<String>,
@@ -63,7 +64,7 @@ pub struct CoupledLoops {
 }
 
 impl CoupledLoops {
-    /// The lowest gain at which an axis alone is on its edge; infinite where none is.
+    /// The lowest gain at which an axis alone is at its stability limit; infinite where none is.
     pub fn lowest_alone(&self) -> f64 {
         self.alone.iter().filter_map(|(_, limit)| limit.critical_gain).fold(f64::INFINITY, f64::min)
     }
@@ -73,7 +74,7 @@ impl CoupledLoops {
         !self.loci.is_empty() && self.loci.iter().flatten().all(|[re, im]| re.hypot(*im) < NOTHING)
     }
 
-    /// Whether the axes looked at one by one would allow gains at which all together are not stable.
+    /// Whether the axes analysed one by one would allow gains at which all together are not stable.
     pub fn alone_misleads(&self) -> bool {
         self.together.critical_gain.is_some_and(|gain| self.lowest_alone() > MISLEADING * gain)
     }
@@ -82,7 +83,7 @@ impl CoupledLoops {
 /// The loops of a graph in the contact of a session of it, at `gain` = mu*lambda. `None` of a single axis.
 ///
 /// # Errors
-/// In a sentence, why the models do not tell it.
+/// In a sentence, why the models give no answer.
 pub fn coupled_loops(graph: &Graph, session: &Session, gain: f64) -> Result<Option<CoupledLoops>, String> {
     if session.axes.len() < 2 {
         return Ok(None);

@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-/// Two held masters whose forces come back turned: mass, damping, stiffness of each axis, a wall, a servo of second order, and the angle between the
-/// frame in which positions go over and the one in which forces come back.
+/// Two held masters whose forces come back rotated. It has mass, damping, stiffness of each axis, a wall, a servo of second order, and the angle
+/// between the frame of the positions and that of the returning forces.
 struct Turned {
     mass: [f64; 2],
     damping: [f64; 2],
@@ -117,8 +117,8 @@ fn file(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
-/// The three-joint graph without a canceller, its slave with a force sensor that is mounted turned by `degrees` about the vertical, in something soft that
-/// it is always in, and a hand that gives a small knock. Without dry friction, clamps and noise: what is left is the linear loop, and the arms' geometry.
+/// The three-joint graph without a canceller. Its slave has a force sensor that is rotated by `degrees` about the vertical, in something soft that it is
+/// always in; the hand gives a small knock. Without dry friction, clamps and noise: the linear loop and the arms' geometry remain.
 fn sensor_turned(degrees: f64) -> Graph {
     let folder = tempfile::tempdir().unwrap();
     let robots = file("plant/robots");

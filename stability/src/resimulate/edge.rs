@@ -6,13 +6,13 @@ use crate::outcome::Outcome;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
-/// Over which gains an edge is looked for, and how exactly.
+/// The range of gains that is searched for the stability limit, and the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
     /// Lowest mu*lambda of the grid.
     pub lowest: f64,
     /// Where not even that is stable the grid goes on downwards, in the same steps, to this; not below `lowest` where this is not below it. So the
-    /// edge is found wherever it lies, and it does not depend on the gain that is asked about.
+    /// stability limit is found wherever it lies, and it does not depend on the gain in question.
     pub floor: f64,
     /// Highest mu*lambda.
     pub highest: f64,
@@ -23,7 +23,7 @@ pub struct Search {
     /// Whether the grid is run beyond its first gain that is not stable: only then it is seen whether the loop is stable again
     /// above, and from where on a clamp acts.
     pub whole_grid: bool,
-    /// Whether the verdict is looked at again about the edge: only then flickering is seen.
+    /// Whether the verdict is repeated around the stability limit: only then is flickering seen.
     pub around: bool,
 }
 
@@ -39,7 +39,7 @@ const AT_ONCE: usize = 6;
 /// More gains than this are not run below the grid.
 const MOST_BELOW: i32 = 1000;
 
-/// Where the verdict is looked at again about an edge that was found.
+/// Gains, as factors, at which the verdict is repeated around a stability limit that was found.
 const AROUND: [f64; 10] = [0.88, 0.91, 0.94, 0.96, 0.98, 1.02, 1.04, 1.06, 1.09, 1.12];
 
 impl Search {
@@ -66,19 +66,19 @@ pub struct Edge {
     /// The lowest mu*lambda at which it oscillates or runs away; `None` where there is none in the range, or where a clamp or
     /// the travel comes first.
     pub critical_gain: Option<f64>,
-    /// The highest gain below the edge that was found stable; 0 where not even the lowest was, and where nothing could be judged.
+    /// The highest gain below the stability limit that was found stable; 0 where not even the lowest was, and where nothing could be judged.
     pub at_least: f64,
-    /// Lowest gain that is not stable and highest that is, where the verdict changes more than once within 12 % of the edge: a
-    /// slow growth from next to nothing, a sensor's steps and dry friction make it flicker.
+    /// Lowest gain that is not stable and highest that is, where the verdict changes more than once within 12 % of the stability limit. Causes are
+    /// slow growth from a small amplitude, a sensor's steps and dry friction.
     pub flickers: Option<[f64; 2]>,
-    /// The verdict just beyond: at the upper end of the last bracket. Where it was not judged there the edge is not known.
+    /// The verdict just beyond: at the upper end of the last bracket. Where it was not judged there, the stability limit is not known.
     pub outcome_beyond: Option<Outcome>,
-    /// Frequency of what oscillates just beyond, Hz; 0 where it runs away without oscillating; `None` where there is no edge.
+    /// Frequency of the oscillation just above the limit, Hz; 0 for a run-away without oscillation; `None` where there is no limit.
     pub frequency_hz: Option<f64>,
     /// The lowest gain at which a clamp acts or the travel is left: exact to the tolerance where this comes before any
     /// oscillation, else to the grid. `None` where there is none.
     pub limited_from: Option<f64>,
-    /// The lowest gain of the grid above the edge at which it is stable again.
+    /// The lowest gain of the grid above the stability limit at which it is stable again.
     pub returns_to_stable: Option<f64>,
     /// Runs that were needed.
     pub evaluations: usize,
@@ -92,7 +92,7 @@ fn is_unjudged(outcome: &Outcome) -> bool {
     matches!(outcome, Outcome::NotJudged { .. })
 }
 
-/// Finds the edge: a grid first, then its first bracket is narrowed. `done` hears (runs done, runs in the grid).
+/// Finds the stability limit: a grid first, then its first bracket is narrowed. `done` hears (runs done, runs in the grid).
 ///
 /// # Errors
 /// A search over no range; a run that cannot be done; `cancel` was set.
@@ -144,8 +144,8 @@ pub fn edge(
     })
 }
 
-/// Runs at the gains of the grid, up to where they are not stable any more unless all of it is wanted, and below it where its lowest gain is
-/// not stable; in the order of the gains.
+/// Runs at the gains of the grid, up to where they are not stable any more unless all of it is wanted. Where its lowest gain is not stable it also
+/// runs below the grid; in the order of the gains.
 fn grid(
     scenario: &Scenario,
     search: &Search,

@@ -1,7 +1,7 @@
-//! The loop run again at another gain, with the models of a bag or swapped ones, moved by the hand that was recorded.
+//! Re-simulation of the loop at another gain, with the models of a bag or exchanged ones, moved by the recorded hand.
 //!
-//! Friction and hysteresis give limit cycles that no linear test sees; with them the edge depends on what the hand does, so
-//! every answer is that of a stated script: the bag's own intent, or another graph's operator.
+//! Friction and hysteresis give limit cycles that no linear test sees. With them the stability limit depends on what the hand does, so every answer
+//! is that of a stated script: the bag's own intent, or another graph's operator.
 
 pub mod edge;
 pub mod grip;

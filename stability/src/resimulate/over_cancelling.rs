@@ -1,4 +1,4 @@
-//! Whether the canceller takes out more at rest than the force puts in: then the loop runs away without oscillating.
+//! Whether the canceller subtracts more at rest than the force puts in: then the loop runs away without oscillating.
 //!
 //! Kuchenbecker & Niemeyer's canceller subtracts Ghat_f F_f. Where the real grip is firmer than its model assumes,
 //! |Ghat(0)| > |G(0)|, the loop becomes positive feedback at DC, and its limit is
@@ -13,7 +13,7 @@ use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
 use std::sync::atomic::AtomicBool;
 
-/// Amplitude at which "large" is looked at, as a share of the travel: hysteresis and presliding show their soft side.
+/// Amplitude at which "large" is evaluated, as a share of the travel: hysteresis and presliding show their soft side.
 const LARGE_SHARE: f64 = 0.01;
 /// The same where a device has no travel, m or rad.
 const LARGE: f64 = 1e-3;
@@ -33,15 +33,15 @@ pub struct StaticBalance {
     pub master: f64,
     /// |Ghat(0)| of the canceller's model with the grip it assumes.
     pub model: f64,
-    /// The mu*lambda beyond which the loop runs away; `None` where the canceller does not take out too much.
+    /// The mu*lambda beyond which the loop runs away; `None` where the canceller does not subtract too much.
     pub dc_limit: Option<f64>,
 }
 
 /// What the canceller does at rest, over the grips.
 #[derive(Debug, Clone)]
 pub struct OverCancelling {
-    /// K_e, static stiffness from the slave's command to the force of what it touches, per axis, N/m or N m/rad, at the depth
-    /// of the scenario's own push; 0 on an axis that touches nothing.
+    /// K_e, static stiffness from the slave's command to the contact force, per axis, N/m or N m/rad, at the depth of the scenario's own push; 0 on
+    /// an axis that touches nothing.
     pub environment_stiffness: Vec<f64>,
     /// Every grip at a small and a large amplitude; empty without a canceller, and with a high-pass, which takes nothing out at rest.
     pub balances: Vec<StaticBalance>,
@@ -220,13 +220,13 @@ fn environment_stiffness(scenario: &Scenario, options: &RunOptions, cancel: &Ato
 /// The canceller beside none.
 #[derive(Debug, Clone)]
 pub struct AgainstNone {
-    /// The edge without a canceller.
+    /// The stability limit without a canceller.
     pub without: Edge,
     /// Where the canceller makes it worse.
     pub warning: Option<String>,
 }
 
-/// Whether the canceller raises the edge at all: a wrong model can make the loop worse than none. `None` where nothing is cancelled.
+/// Whether the canceller raises the stability limit at all: a wrong model can make the loop worse than none. `None` where nothing is cancelled.
 ///
 /// # Errors
 /// A run that cannot be done; `cancel` was set.
@@ -243,7 +243,7 @@ pub fn against_none(
         return Ok(None);
     }
     let without = edge(&scenario.without_canceller(), search, options, done, cancel)?;
-    // Of an edge below the searched range only that is known.
+    // Of a limit below the searched range only that is known.
     let ends = |edge: &Edge| edge.critical_gain.unwrap_or(if edge.at_least > 0.0 { edge.at_least } else { search.lowest });
     let (end, end_without) = (ends(with), ends(&without));
     let warning = (with.outcome_beyond.is_some() && end < end_without * (1.0 - search.tolerance)).then(|| {

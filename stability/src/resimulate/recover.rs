@@ -1,9 +1,8 @@
 //! The operator's intent from a bag that did not record it.
 //!
-//! Kuchenbecker & Niemeyer's x^_mu = x_m - Ghat_f F_f is where the hand alone would have taken the master. The hand that takes
-//! it there is found by playing the recorded F_f and a hand x_u to the master's model, and correcting x_u by the error of x_m,
-//! through the inverse of the model's response to the hand, again and again: without lag, for the whole record is known, and
-//! with friction and hysteresis, for the model has them.
+//! Kuchenbecker & Niemeyer's x^_mu = x_m - Ghat_f F_f is where the hand alone would have taken the master. The hand that takes it there is found by
+//! iteration. The recorded F_f and a hand x_u drive the master's model, and the inverse of the model's response to the hand corrects x_u by the error
+//! of x_m. There is no lag, because the whole record is known, and friction and hysteresis are included, because the model has them.
 
 use super::ResimulateError;
 use crate::session::Session;
@@ -29,9 +28,9 @@ const STILL_S: f64 = 0.45;
 const BLEND_S: f64 = 0.02;
 /// Corrections at most; they stop earlier where the error falls no more.
 const PASSES: usize = 20;
-/// The model's response to the hand is looked at with this amplitude across what is not linear, as a share of the range of x_m.
+/// The model's response to the hand is evaluated with this amplitude across what is not linear, as a share of the range of x_m.
 const LOOK_SHARE: f64 = 0.05;
-/// Amplitude at which the grip's compliance is looked at, m or rad.
+/// Amplitude at which the grip's compliance is evaluated, m or rad.
 const LOOK_AT: f64 = 1e-3;
 /// A record that lacks more of x_m or F_f than this share cannot be followed.
 const MOST_MISSING: f64 = 0.1;
@@ -41,10 +40,10 @@ const MOST_MISSING: f64 = 0.1;
 pub struct Recovered {
     /// What the hand wanted, per axis, one row per step.
     pub intents: Vec<Intent>,
-    /// RMS of what is left between x_m and the model moved by that hand, as a share of the range of x_m, per axis.
+    /// RMS of the residual between x_m and the model moved by that hand, as a share of the range of x_m, per axis.
     pub residual: Vec<f64>,
-    /// By how much the hand may have been elsewhere without x_m showing it, per axis, m or rad: what dry friction holds against
-    /// the grip. With friction the edge depends on what the hand does, so where this is large the edge is less sure.
+    /// How far the true hand may have been from the recovered one without an effect on x_m, per axis, m or rad: the motion that dry friction holds
+    /// against the grip. With friction the stability limit depends on what the hand does, so where this is large the limit is less certain.
     pub ambiguity: Vec<f64>,
     /// Time in which the hand holds still on all axes, s: only there a verdict can be drawn.
     pub still_s: f64,
@@ -128,8 +127,8 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
     Ok(Recovered { intents: intents.iter().map(|x| recorded(x, session.period_s)).collect(), residual, ambiguity, still_s })
 }
 
-/// x_m of the model under recorded forces and a hand: at row k the plant has been carried there by the force of row k-1 and the
-/// hand's motion to row k, as the master's node does it.
+/// x_m of the model under recorded forces and a hand: at row k the force of row k-1 and the hand's motion to row k have carried the plant there, as
+/// in the master's node.
 fn follow(device: &Device, forces: &[Vec<f64>], hands: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let (axes, rows) = (device.axes(), forces.first().map_or(0, Vec::len));
     let mut device = device.clone();
@@ -226,7 +225,7 @@ impl Filter {
         self.each_line(signal, |_, line| line)
     }
 
-    /// The hand's motion that moves x_m by `error`, where the response to the hand is large enough to tell.
+    /// The hand's motion that moves x_m by `error`, where the response to the hand is large enough to determine it.
     fn through_inverse(&self, error: &[f64], hand: &[Complex<f64>]) -> Vec<f64> {
         const LEAST: f64 = 0.1;
         self.each_line(error, |i, line| line * hand[i].conj() / hand[i].norm_sqr().max(LEAST * LEAST))

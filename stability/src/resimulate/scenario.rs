@@ -14,11 +14,11 @@ use backdrive_nodes::sequence::Sequence;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Steps between looks at whether to end early.
+/// Steps between checks whether to end early.
 const CHUNK: u64 = 256;
 
-/// Brings the cores of a node that is a program of the user's own, for each run anew; the grip's forces are to be scaled by the number. `None`: as
-/// the graph says.
+/// Makes the cores of a node that is a user's own program, new for each run; the number scales the grip's forces. `None`: the node of the graph is
+/// used.
 pub type OwnCores = Arc<dyn Fn(&Graph, &Node, f64) -> Option<Result<Vec<Box<dyn Core>>, String>> + Send + Sync>;
 
 /// A loop with a script, ready to be run at any gain.
@@ -37,8 +37,8 @@ impl std::fmt::Debug for Scenario {
 }
 
 impl Scenario {
-    /// Of a graph with the command line's changes already in it, moved by `intents` (one per axis) for `steps` steps; by the
-    /// graph's own operator where there are no intents, for as long as it says where there are no steps.
+    /// Of a graph that already contains the command line's changes, moved by `intents` (one per axis) for `steps` steps. Without intents the graph's
+    /// own operator moves it, and without steps it runs for the duration in the graph.
     ///
     /// Scheduled changes of the gains are removed, and the guard is off.
     ///
@@ -80,12 +80,12 @@ impl Scenario {
             }
         }
         let scenario = Scenario { graph, steps, script: script.to_string(), own: None };
-        // What cannot be built is told now, not in the middle of a sweep.
+        // A part that cannot be built is reported now, not in the middle of a sweep.
         scenario.sequence(&scenario.graph, 1.0)?;
         Ok(scenario)
     }
 
-    /// The same with cores of the caller's own in the place of some nodes: a device that is not simulated here.
+    /// The same with the caller's own cores instead of some nodes: a device that is not simulated here.
     pub fn with_own_cores(mut self, own: OwnCores) -> Scenario {
         self.own = Some(own);
         self
@@ -96,7 +96,7 @@ impl Scenario {
         &self.graph
     }
 
-    /// What the hand does, for the report: the edge holds for this script.
+    /// What the hand does, for the report: the stability limit holds for this script.
     pub fn script(&self) -> &str {
         &self.script
     }

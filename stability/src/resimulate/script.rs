@@ -11,7 +11,7 @@ use std::path::Path;
 pub struct Script {
     /// Title of the graph that it comes from.
     pub name: String,
-    /// What the hand wants, per axis.
+    /// The hand's intended motion, per axis.
     pub intents: Vec<Intent>,
     /// Length, s; `None` where the graph has none.
     pub duration_s: Option<f64>,

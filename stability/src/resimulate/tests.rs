@@ -1,4 +1,4 @@
-//! Re-simulation of the graphs in the workspace: known edges, limits, grips, recovered hands.
+//! Re-simulation of the graphs in the workspace: known stability limits, clamps, grips, recovered hands.
 
 use super::edge::{Edge, Search, edge};
 use super::over_cancelling::{against_none, over_cancelling};
@@ -51,7 +51,7 @@ fn find(scenario: &Scenario, search: &Search) -> Edge {
     edge(scenario, search, &RunOptions::default(), &|_, _| {}, &NEVER).unwrap()
 }
 
-/// Grip of the canceller scaled, the master's as it is.
+/// Grip of the canceller scaled, the master's unchanged.
 fn assume_grip(scenario: &Scenario, factor: f64) -> Scenario {
     let mut scenario = scenario.clone();
     for node in &mut scenario.graph.nodes {
@@ -73,7 +73,7 @@ fn the_linear_loop_ends_where_its_frequency_response_says() {
     let run = linear(None).run(Gain { mu: 1.0, lambda: 1.02 * critical }, &RunOptions::default(), &NEVER).unwrap();
     let frequency = match run.outcome {
         Outcome::LimitCycle { frequency_hz, .. } => frequency_hz,
-        // A growing oscillation has the frequency of its line all the same.
+        // A growing oscillation has the frequency of its line nevertheless.
         _ => {
             let run =
                 linear(None).run(Gain { mu: 1.0, lambda: critical }, &RunOptions { keep_signals: true, ..Default::default() }, &NEVER);
@@ -84,8 +84,8 @@ fn the_linear_loop_ends_where_its_frequency_response_says() {
     assert!((frequency / law_hz - 1.0).abs() < 0.02, "{frequency} Hz against {law_hz} Hz");
 }
 
-/// The linear loop's edge and its frequency, Hz, from the models' frequency responses: where L = G_f H_se e^(-1.5 s T) crosses
-/// the positive real axis (one step of delay on F_s, half a step of the force's hold).
+/// The linear loop's critical gain and its frequency, Hz, from the models' frequency responses. It is where L = G_f H_se e^(-1.5 s T) crosses the
+/// positive real axis (one step of delay on F_s, half a step of the force's hold).
 fn phase_crossover(scenario: &Scenario, grip_scale: f64) -> (f64, f64) {
     let device = |kind: NodeKind| {
         let (Settings::Master(files) | Settings::Slave(files)) = &scenario.graph.node_of(kind).unwrap().settings else { panic!() };

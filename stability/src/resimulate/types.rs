@@ -5,7 +5,7 @@ use crate::session::Session;
 use backdrive_nodes::build::BuildError;
 use backdrive_nodes::sequence::SequenceError;
 
-/// Why a loop cannot be run again.
+/// Why a loop cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum ResimulateError {
     /// A part of the loop is missing.
@@ -60,7 +60,7 @@ pub enum ResimulateError {
     /// The nodes cannot be joined.
     #[error(transparent)]
     Sequence(#[from] SequenceError),
-    /// The master cannot be looked at as a linear system.
+    /// The master cannot be treated as a linear system.
     #[error("{what}: {error}")]
     Linear {
         /// Which device.

@@ -61,7 +61,7 @@ pub(super) fn note_resampled(located: &Located, signal: &Ordered, laid: &Resampl
     }
 }
 
-/// Whether one of the signals ends (or begins) so much before another that whoever sent it was gone for more than 1 % of the recording.
+/// Whether one of the signals ends (or begins) so much before another that its sender was gone for more than 1 % of the recording.
 pub(super) fn ends_apart(needed: &[&Ordered], grid: &Grid) -> Option<Unjudged> {
     let firsts = || needed.iter().filter_map(|o| o.times.first());
     let lasts = || needed.iter().filter_map(|o| o.times.last());

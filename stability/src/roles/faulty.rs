@@ -1,4 +1,4 @@
-//! Which signals of a recording are looked at for faults, and what they are called.
+//! Which signals of a recording are checked for faults, and what they are called.
 
 use super::file::{Located, Roles, key_of};
 use super::table::Named;
@@ -19,7 +19,7 @@ pub(super) fn faulty(roles: &Roles, wanted: &[(SignalRole, &Located)], series: &
         let sensor = index.checked_sub(named).and_then(|i| roles.sensors.get(i));
         let called = sensor.map_or(key_of(*role), |s| s.name.as_str());
         let name = if called == located.place() { called.to_owned() } else { format!("{called} ({})", located.place()) };
-        // With several axes nobody says of which one it is a second sensor.
+        // With several axes it is not stated of which one it is a second sensor.
         let twin = sensor.and_then(|s| s.of).filter(|_| roles.axes.len() == 1).and_then(|of| Some((key_of(of), of_role(of)?)));
         columns.push(Column {
             name,

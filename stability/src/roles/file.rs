@@ -8,7 +8,7 @@ use backdrive_plant::model::{Hold, Motion};
 use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
 
-/// What a roles file says.
+/// The contents of a roles file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Roles {
     /// The signals of each axis.
@@ -21,7 +21,7 @@ pub struct Roles {
     pub rate_hz: Option<f64>,
     /// Column with the times of a table, s.
     pub time: String,
-    /// Further sensors by name, to be looked at for faults.
+    /// Further sensors by name, to be checked for faults.
     pub(super) sensors: Vec<Sensor>,
     /// The roles file, for messages.
     pub(super) file: String,
@@ -100,14 +100,14 @@ impl Roles {
         let mut signals = top.table("signals")?.ok_or_else(|| top.missing("signals"))?;
         let mut axes: Vec<AxisRoles> = Vec::new();
         let mut first_key = "";
-        // A slave with a motor of its own may follow the master itself, with nobody to command it a position.
+        // A slave with a motor of its own may follow the master itself, without a position command.
         let commanded = !(signals.contains("tau_s") && signals.contains("x_s"));
         for (key, role, required, hold) in KEYS {
             let found = read_signals(&mut signals, key, hold)?;
             if found.is_empty() {
                 if required && (role != SignalRole::Command || commanded) {
                     let what = format!("missing key \"{key}\": {}; without it {}", role.text(), role.without());
-                    // A misspelt key is told as such.
+                    // A misspelt key is reported as such.
                     let misspelt = signals.missing(key);
                     return Err(if misspelt.message.contains("did you mean") { misspelt } else { signals.error(what) });
                 }

@@ -4,7 +4,7 @@ use super::file::Roles;
 use crate::phases::contacts;
 use crate::session::{AxisSignals, Session};
 
-/// An estimated gain that explains less of its signal than this is told to be doubtful.
+/// An estimated gain that explains less of its signal than this is reported as doubtful.
 const GOOD_FIT: f64 = 0.8;
 
 /// A gain by least squares: slope, share of the variance that it explains, rows by which the effect lags.
@@ -52,9 +52,9 @@ fn touching(axis: &AxisSignals, period_s: f64) -> (Vec<usize>, Vec<usize>) {
     (0..touches.len()).partition(|row| touches.get(*row).copied().unwrap_or(false))
 }
 
-/// Fills mu and lambda: as the roles file says, else by least squares over the axis that explains most.
+/// Fills mu and lambda: from the roles file, else by least squares over the axis that explains most.
 ///
-/// Two motors that are coupled have their own law, which is told by itself: of theirs only a position scale is known, or taken to be 1.
+/// Two coupled motors have their own law, which is identified by itself: of theirs only a position scale is known, or taken to be 1.
 pub(super) fn settle_gains(session: &mut Session, roles: &Roles) {
     if session.axes.iter().any(|a| a.slave_force.is_some() && a.slave.is_some()) {
         let rows = session.len();

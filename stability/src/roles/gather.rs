@@ -62,10 +62,10 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
             let read = |field: &FieldPath| plan.schema.read(field, &entry.payload).map_err(&damaged);
             let logged = entry.log_time_ns as i64;
             let stamp = plan.stamp.as_ref().map(|path| plan.schema.read_time_ns(path, &entry.payload)).transpose().map_err(&damaged)?;
-            // A stamp that nobody filled in is 0.
+            // A stamp that was not filled in is 0.
             let stamp = stamp.flatten().filter(|ns| *ns != 0);
             for (place, field) in &plan.fields {
-                // A message without the joint that is named says nothing of it.
+                // A message without the named joint has no value for it.
                 let value = match read(field)? {
                     None if field.is_by_name() => continue,
                     value => value.unwrap_or(f64::NAN),
@@ -118,7 +118,7 @@ fn plan(
         };
         let field = plan.schema.find(&located.signal.field);
         let field = field.map_err(|what| roles.at(located, format!("{} ({}): {what}", topic.name, topic.type_name)))?;
-        // Where the bag tells the axes, they are the same in every message.
+        // Where the bag states the axes, they are the same in every message.
         if topic.axes.is_empty() && field.is_by_place() {
             plan.joints.get_or_insert_default();
         }

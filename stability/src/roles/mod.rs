@@ -1,4 +1,4 @@
-//! Other people's recordings: a roles file says which field of which topic, or which column of a table, is which signal.
+//! Other people's recordings: a roles file assigns a signal to a field of a topic, or to a column of a table.
 //!
 //! ```toml
 //! axes = ["x"]                         # names; optional
@@ -18,8 +18,8 @@
 //! rate_hz = 1000
 //! ```
 //!
-//! Of a table (CSV) the columns are named in the place of topics: `x_m = "master_position"`, or `{ column = "...", scale = -1.0 }`. Where the
-//! slave has a motor of its own (`tau_s`, with `x_s`) the law that couples the two motors is told, and `x_c` may be left out.
+//! For a table (CSV) columns are named instead of topics: `x_m = "master_position"`, or `{ column = "...", scale = -1.0 }`. Where the slave has a
+//! motor of its own (`tau_s`, with `x_s`) the law that couples the two motors is identified, and `x_c` may be omitted.
 //!
 //! `docs/roles-example.toml` has every key with its meaning. Any ROS 2 type can be read whose ros2msg schema is in the bag. Positions
 //! are interpolated linearly between their samples; forces hold the last one, as a servo does (`hold` in a table changes either).

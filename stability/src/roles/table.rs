@@ -1,4 +1,4 @@
-//! The wanted signals from a table (CSV): columns in the place of topics.
+//! The wanted signals from a table (CSV): columns instead of topics.
 
 use super::file::{Located, Roles};
 use crate::grid::Series;
@@ -36,7 +36,7 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
         "t" => Vec::new(),
         time => vec![("t".to_owned(), ColumnRule::of(Source::Column(time.to_owned())))],
     };
-    // A column of words is in nobody's way that did not ask for it.
+    // A column of words disturbs no reader that did not request it.
     let read = |only: Option<&[&str]>| read_csv(path, only, &rules, &Piece::default());
     let mut asked = columns.clone();
     asked.sort_unstable();
@@ -95,7 +95,7 @@ mod tests {
         assert_eq!(axis.command, axis.master);
         let told: Vec<&str> = session.sensors.iter().map(|s| s.signal.as_str()).collect();
         assert_eq!(told, ["second (gauge)"], "a column of words keeps the others from being read: {told:?}");
-        // Without it every column is looked at.
+        // Without it every column is read.
         let text = std::fs::read_to_string(&path).unwrap().replace(",words", "").replace(",on\n", "\n");
         std::fs::write(&path, text).unwrap();
         let session = Session::from_roles(&path, &roles).unwrap();

@@ -1,4 +1,4 @@
-//! Which method leads, and what the headline is before it is held against everything else that is known.
+//! Which method leads, and the headline before it is compared with everything else that is known.
 
 use super::question::{Question, Swapped};
 use super::recorded::recorded_outcome;
@@ -100,12 +100,12 @@ impl Answer {
         self.checks.iter().filter(counts).all(|c| c.agrees) && self.loop_check.is_none_or(|c| c.agrees)
     }
 
-    /// Whether the recording says anything of the models.
+    /// Whether the recording tests the models at all.
     fn models_are_checked(&self) -> bool {
         !self.checks.is_empty() || self.loop_check.is_some()
     }
 
-    /// Weighs the methods, and says what follows.
+    /// Weighs the methods and concludes.
     pub(super) fn conclude(&mut self, swapped: Swapped) {
         let agree = self.models_agree(swapped);
         self.find_disagreements(swapped);
@@ -132,7 +132,7 @@ impl Answer {
         }
         self.by_the_recording();
         self.hold_back();
-        // Where the loop was not measured at all, how to measure it is worth saying even beside a verdict.
+        // Where the loop was not measured at all, the answer explains how to measure it even beside a verdict.
         if told || (measured && self.verdict != Word::CannotTell) {
             self.advice = None;
         }
@@ -188,12 +188,11 @@ impl Answer {
         self.reason = more.map_or(why.to_string(), |more| format!("{why} ({more})"));
     }
 
-    /// What is cut short, has holes or never touched anything says nothing for a loop; what it says against one stands.
+    /// A recording that is cut short, has gaps or contains no contact is no evidence for a stable loop; its evidence against one counts.
     fn hold_back(&mut self) {
         let Some(Outcome::NotJudged { why }) = self.recorded_outcome else { return };
-        // A hand that never holds still moves the loop all the same, and a frequency response is told from that.
-        // Nor does a recording at lambda = 0 speak against a loop that it never closed.
-        // What contradicts itself is no record at all: that is the first thing to know of it.
+        // A hand that never holds still moves the loop nevertheless, and that gives a frequency response. Nor does a recording at lambda = 0 speak
+        // against a loop that it never closed. What contradicts itself is no record at all: that is the first thing to know of it.
         let comes_first = self.verdict == Word::CannotTell && why == Unjudged::Contradictory;
         if self.verdict != Word::Stable && !comes_first || matches!(why, Unjudged::NoHold | Unjudged::NoFeedback) {
             return;
@@ -217,7 +216,7 @@ impl Answer {
         }
     }
 
-    /// The interval of a re-simulated edge: as wide as the recording leaves the loop near its crossover uncertain.
+    /// The interval of a re-simulated stability limit: from the uncertainty of the recorded loop near its crossover.
     pub(super) fn interval_about(&self, critical: f64) -> Option<(f64, Option<f64>)> {
         let frequency = self.frequency.as_ref().filter(|f| f.cannot_tell.is_none())?;
         let measured = match (frequency.edge.gain, frequency.edge.ci95) {
@@ -230,7 +229,7 @@ impl Answer {
             return frequency.edge.at_least.map(|least| (least.min(critical), None));
         };
         let (low, high) = (critical * low.max(0.0), high.map(|h| critical * h));
-        // Where the verdict flickers the edge is no point.
+        // Where the verdict flickers, the stability limit is not a single gain.
         let highest = self.resimulated.as_ref().and_then(|r| r.edge.flickers).map_or(0.0, |[_, highest]| highest * 1.01);
         Some((low, high.map(|h| h.max(highest))))
     }

@@ -7,7 +7,7 @@ use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
 
 impl Answer {
-    /// Lists what does not go together: models and recording, and the methods with each other.
+    /// Lists contradictions: between models and recording, and between the methods.
     pub(super) fn find_disagreements(&mut self, swapped: Swapped) {
         let mut found = Vec::new();
         for check in self.checks.iter().filter(|c| !c.agrees) {
@@ -50,7 +50,7 @@ impl Answer {
     }
 }
 
-/// Whether one says stable and the other not.
+/// Whether one verdict is stable and the other is not.
 fn verdicts_differ(answer: &FrequencyAnswer, again: &Outcome) -> bool {
     match answer.verdict {
         frequency::Verdict::Stable => matches!(again, Outcome::LimitCycle { .. } | Outcome::Unstable { .. }),
@@ -59,7 +59,7 @@ fn verdicts_differ(answer: &FrequencyAnswer, again: &Outcome) -> bool {
     }
 }
 
-/// Whether the edges differ by more than 5 % beyond the interval of the measured one.
+/// Whether the stability limits differ by more than 5 % beyond the interval of the measured one.
 fn edges_lie_apart(answer: &FrequencyAnswer, again: &Edge) -> bool {
     match (answer.critical_gain_ci95, again.critical_gain) {
         (Some((low, high)), Some(edge)) => edge < 0.95 * low || high.is_some_and(|h| edge > 1.05 * h),
@@ -77,7 +77,7 @@ fn edge_in_words(gain: Option<f64>, least: Option<f64>) -> String {
     }
 }
 
-/// Why the measured response and the loop that is run again may give different edges.
+/// Why the measured response and the re-simulation may give different stability limits.
 fn why_apart(swapped: Swapped, amplitude_dependent: bool, model_is_off: bool) -> &'static str {
     match () {
         () if model_is_off => {

@@ -1,14 +1,14 @@
-//! The headline: the least favourable of what is known, in one verdict with one edge and one frequency.
+//! The headline: the least favourable of what is known, in one verdict with one stability limit and one frequency.
 //!
-//! `decide.rs` says which method leads. What it says is then held against everything else that is known and counts (a [`Witness`]):
-//! - with the models leading: the loop run again with every grip of the range asked about, for nobody knows a grip exactly; and the measured
-//!   frequency response, where its edge lies below the others' by more than the uncertainty of both. Delays that the models lack are in the
-//!   measured loop, so they count by it;
+//! `decide.rs` selects the method that leads. Its result is then compared with everything else that is known and counts (a [`Witness`]):
+//! - with the models leading: the re-simulation with every grip of the requested range, because no grip is known exactly. Also the measured frequency
+//!   response, where its limit is below the others' by more than the uncertainty of both. Delays that the models lack are in the measured loop, so
+//!   they count by it;
 //! - with the frequency response leading: it alone, for then the models have been seen to do something else than was recorded.
 //!
-//! The lowest edge is the headline's, with the frequency of the same witness. The verdict is green only where every witness is, and where the gain
-//! asked about lies below that edge and outside of its 95 % interval: a gain beyond an edge at which one run happens to look stable is not stable,
-//! and one within the interval is too close to call. Where witnesses differ the reason names both, and the lower edge is the one to act on.
+//! The headline has the lowest stability limit, with the frequency of the same witness. The verdict is green only where every witness is, and where
+//! the gain in question lies below that limit and outside its 95 % interval. A gain above a limit at which one run happens to look stable is not
+//! stable, and one within the interval is too close to call. Where witnesses differ the reason names both, and the lower limit is the one to act on.
 
 use super::types::Answer;
 use super::witness::Witness;
@@ -32,7 +32,7 @@ fn grip_name(scale: f64) -> String {
     if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as firm") }
 }
 
-/// Logarithm of the ratio up to which two edges may be one.
+/// Logarithm of the ratio up to which two stability limits may be one.
 const SAME_EDGE: f64 = 0.22;
 
 impl Answer {
@@ -69,13 +69,13 @@ impl Answer {
         all
     }
 
-    /// Makes the verdict, the edge and its frequency those of the least favourable witness. Says whether the reason then names both it and the
-    /// one that leads, each with its edge.
+    /// Makes the verdict, the stability limit and its frequency those of the least favourable witness. Returns whether the reason then names both it
+    /// and the one that leads, each with its limit.
     pub(super) fn least_favourable(&mut self) -> bool {
         let witnesses = self.witnesses();
         let asked = self.gain.product();
         let Some(leads) = witnesses.first() else { return false };
-        // The edge: the lowest.
+        // The stability limit: the lowest.
         let lowest =
             witnesses.iter().filter(|w| w.end().is_some()).min_by(|a, b| a.end().unwrap_or(0.0).total_cmp(&b.end().unwrap_or(0.0)));
         if let Some(lowest) = lowest.filter(|_| leads.method == Method::Resimulation) {
@@ -89,13 +89,13 @@ impl Answer {
                 }
             };
         }
-        // The verdict: the worst; of several equally bad ones that with the lowest edge.
+        // The verdict: the worst; of several equally bad ones that with the lowest stability limit.
         let end = |w: &Witness| w.end().unwrap_or(f64::INFINITY);
         let worst = witnesses.iter().max_by(|a, b| {
             let (a_word, b_word) = (a.word_at(asked), b.word_at(asked));
             rank(a_word).min(2).cmp(&rank(b_word).min(2)).then(end(b).total_cmp(&end(a)))
         });
-        // All that is not stable is equally negative: where the one that leads is, it is the one to tell.
+        // All that is not stable is equally negative: where the one that leads is, it is the one to report.
         let negative = |word: Word| rank(word).min(2);
         let worse = worst.filter(|w| negative(w.word_at(asked)) > negative(leads.word_at(asked))).unwrap_or(leads);
         let word = worse.word_at(asked);
@@ -112,7 +112,7 @@ impl Answer {
         both_named
     }
 
-    /// Within the interval of its edge a gain is neither.
+    /// Within the interval of its stability limit a gain is neither.
     fn too_close(&mut self, asked: f64) {
         let Some((low, Some(high))) = self.critical_gain_ci95 else { return };
         if self.verdict == Word::Stable && asked >= low && asked <= high {
@@ -122,13 +122,13 @@ impl Answer {
         }
     }
 
-    /// By how much the gain may rise to the headline's edge, dB; below 0 beyond it; `None` where no edge is known.
+    /// The distance of the gain to the headline's stability limit, dB; below 0 above the limit; `None` where no limit is known.
     pub fn gain_margin_db(&self) -> Option<f64> {
         self.critical_gain.map(|edge| 20.0 * (edge / self.gain.product()).log10())
     }
 
-    /// Whether the margins of the measured response are those of the headline's edge: they are told beside it only then. An open interval
-    /// holds every edge and does not make the margins of one those of another.
+    /// Whether the margins of the measured response are those of the headline's limit: they are reported beside it only then. An open interval
+    /// contains every limit and does not make the margins of one those of another.
     pub fn margins_are_of_the_edge(&self) -> bool {
         let Some(edge) = self.critical_gain else { return self.limited_from.is_none() };
         let Some(answer) = &self.frequency_answer else { return false };
@@ -136,7 +136,7 @@ impl Answer {
         1.05 * edge >= low && high.is_none_or(|high| edge <= 1.05 * high) && (measured / edge).ln().abs() < SAME_EDGE
     }
 
-    /// Tells in the reason whose edge the headline's is, and beside which other.
+    /// States in the reason whose stability limit the headline has, and which other one differs from it.
     pub(super) fn name_the_edge(&mut self) {
         let (Some(by), Some(leads)) = (&self.decided_by, self.witnesses.first()) else { return };
         if self.from == Method::Frequency {
@@ -157,7 +157,7 @@ impl Answer {
     }
 }
 
-/// Why it is not stable, by the witness that says so beside the one that leads.
+/// Why it is not stable, by the witness that found it and the one that leads.
 fn reason(worst: &Witness, asked: f64, leads: Option<&Witness>) -> String {
     let edge = |w: &Witness| match (w.critical_gain, w.end()) {
         (Some(edge), _) => format!("edge at mu*lambda = {edge:.3}"),

@@ -2,14 +2,14 @@
 //!
 //! Which answer leads:
 //! - Where the models in the bag do what the recording shows, the re-simulation: it knows friction, contact and clamps.
-//! - Where they do not, the frequency response, which needs no model; the disagreement is told, for it is the first sign of
-//!   physics that the models leave out.
-//! - Where neither tells, it cannot be told, and the answer says what to record.
+//! - Where they do not, the frequency response, which needs no model; the disagreement is reported, because it is the first sign of effects that the
+//!   models omit.
+//! - Where neither gives an answer, the verdict is "cannot tell", and the answer states what to record.
 //!
-//! The method that leads gives the reason; the headline (verdict, edge, frequency) is then the least favourable of all that counts: see
-//! `headline.rs`. A recording that is cut short, has holes in it or never touched anything gives no green answer, whatever a method says.
+//! The method that leads gives the reason; the headline (verdict, stability limit, frequency) is then the least favourable of all that counts: see
+//! `headline.rs`. A recording that is cut short, has gaps in it or contains no contact gives no green answer, whatever the methods find.
 //!
-//! Where both motors' forces were recorded, the recording is judged by what the pair did at its own gains, and their law is told: `coupled.rs`.
+//! Where both motors' forces were recorded, the recording is judged by what the pair did at its own gains, and their law is identified: `coupled.rs`.
 //!
 //! Energy never leads: passivity is enough for stability, and not needed for it.
 
@@ -137,7 +137,7 @@ fn resimulate(question: &Question, scenario: &Scenario, progress: Progress, canc
     let edge = edge(scenario, &question.search, &options, &|done, all| progress("the edge", done, all), cancel)?;
     let asked = Some(question.gain.product());
     let others: Vec<f64> = question.grips.iter().copied().filter(|s| *s != 1.0).collect();
-    // For other grips the edge need not be as exact.
+    // For other grips the stability limit need not be as exact.
     let coarse = Search { tolerance: 0.02, per_decade: 20, whole_grid: false, ..question.search };
     let grips = grips(scenario, &others, asked, &coarse, &options, &|done, all| progress("other grips", done, all), cancel)?;
     let over_cancelling = over_cancelling(scenario, &question.grips, asked, &options, cancel).ok();

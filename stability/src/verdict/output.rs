@@ -10,7 +10,7 @@ impl Answer {
     /// For scripts.
     pub fn json(&self) -> Value {
         let again = self.resimulated.as_ref();
-        // One margin: to the headline's edge. Those of the measured response beside it where they are of the same edge.
+        // One margin: to the headline's stability limit. The margins of the measured response are added where they belong to the same limit.
         let margins = self.margins.as_ref().filter(|_| self.margins_are_of_the_edge());
         let cycle = again.filter(|_| self.from == Method::Resimulation).map(|a| a.outcome);
         let cycle = if self.from == Method::Recording { self.recorded_outcome } else { cycle };
@@ -76,7 +76,7 @@ impl Answer {
         })
     }
 
-    /// What each method says by itself.
+    /// The result of each method by itself.
     fn methods(&self) -> Value {
         let frequency = self.frequency_answer.as_ref();
         let again = self.resimulated.as_ref();

@@ -27,7 +27,7 @@ pub struct Question<'a> {
     pub gain: Gain,
     /// Factors on the grip over which the answer is given; empty for none.
     pub grips: Vec<f64>,
-    /// Where the edge is looked for.
+    /// Where the stability limit is searched.
     pub search: Search,
 }
 

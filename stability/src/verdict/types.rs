@@ -22,7 +22,7 @@ use backdrive_control::margins::Margins;
 use backdrive_nodes::build::BuildError;
 use serde::Serialize;
 
-/// What does not go together.
+/// A contradiction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Apart {
@@ -32,7 +32,7 @@ pub enum Apart {
     Methods,
 }
 
-/// Two things that do not go together.
+/// Two results that contradict each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Disagreement {
     /// Which.
@@ -44,7 +44,7 @@ pub struct Disagreement {
 /// The loop that was measured beside the loop that the models make of the same session.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoopCheck {
-    /// RMS of the relative difference over the lines near the edge.
+    /// RMS of the relative difference over the lines near the stability limit.
     pub difference: f64,
     /// What the noise of both explains of it.
     pub noise: f64,
@@ -63,7 +63,7 @@ pub struct Resimulated {
     pub edge: Edge,
     /// The same for other grips.
     pub grips: Vec<GripEdge>,
-    /// Whether the canceller takes out too much at rest.
+    /// Whether the canceller subtracts too much at rest.
     pub over_cancelling: Option<OverCancelling>,
     /// Energy at the gain asked.
     pub energy: EnergyAnswer,
@@ -94,7 +94,7 @@ pub struct Answer {
     pub limited_from: Option<f64>,
     /// 95 % interval; an open upper end is `None`.
     pub critical_gain_ci95: Option<(f64, Option<f64>)>,
-    /// Frequency on the edge, Hz; 0 where it runs away without oscillating.
+    /// Frequency at the stability limit, Hz; 0 for a run-away without oscillation.
     pub critical_frequency_hz: Option<f64>,
     /// Margins at the gain asked, by the measured frequency response.
     pub margins: Option<Margins>,
@@ -112,9 +112,9 @@ pub struct Answer {
     pub recorded_energy: EnergyAnswer,
     /// Transparency as recorded, per axis.
     pub transparency: Vec<Transparency>,
-    /// How well each device's model tells the device.
+    /// How well each device's model predicts the device.
     pub checks: Vec<PartCheck>,
-    /// How well the models tell the loop.
+    /// How well the models predict the loop.
     pub loop_check: Option<LoopCheck>,
     /// Where answers and models part.
     pub disagreements: Vec<Disagreement>,
@@ -126,11 +126,11 @@ pub struct Answer {
     pub held_back: Option<Unjudged>,
     /// Everything that counted, the method that leads first.
     pub witnesses: Vec<Witness>,
-    /// Whose edge and frequency the headline has.
+    /// Whose stability limit and frequency the headline has.
     pub decided_by: Option<String>,
     /// What couples the motors of each axis whose motors were both recorded; empty where none was.
     pub coupled: Vec<CoupledAxis>,
-    /// The loops of several axes together, by the models; why they do not tell it; `None` of one axis, and where there are no models.
+    /// The loops of several axes together, by the models, or why they give no answer; `None` of one axis, and where there are no models.
     pub loops: Option<Result<CoupledLoops, String>>,
     /// Signals that say nothing, or not always.
     pub sensors: Vec<SensorFault>,
@@ -141,7 +141,7 @@ pub struct Answer {
 pub struct CoupledAxis {
     /// Name of the axis.
     pub axis: String,
-    /// The law of either motor; `None` where it cannot be told.
+    /// The law of either motor; `None` where it cannot be identified.
     pub coupling: Option<Coupling>,
     /// Why it cannot.
     pub why_not: Option<String>,
@@ -159,7 +159,7 @@ pub enum AnswerError {
     /// Of the session.
     #[error(transparent)]
     Frequency(#[from] FrequencyError),
-    /// Of the loop that is run again.
+    /// Of the re-simulation.
     #[error(transparent)]
     Resimulate(#[from] ResimulateError),
     /// Of a device.

@@ -16,7 +16,7 @@ pub(super) fn of_what_was_read(session: &Session) -> Vec<Warning> {
 
 /// What the recording and its frequency response have to say, each once.
 pub(super) fn of_the_recording(session: &Session, frequency: &Frequency) -> Vec<Warning> {
-    // That the edge depends on the amplitude is told with the numbers, by `Answer::warn`.
+    // The dependence of the stability limit on the amplitude is reported with the values, by `Answer::warn`.
     let notes = frequency.notes.iter().filter(|n| **n != Note::AmplitudeDependent).cloned().map(Warning::Frequency);
     let mut warnings = of_what_was_read(session);
     warnings.extend(notes);

@@ -11,11 +11,11 @@ use std::fmt;
 pub enum Warning {
     /// Of how the recording was read.
     Recording(String),
-    /// Of a signal that says nothing, or not always.
+    /// A signal is without information, always or at times.
     Sensor(SensorFault),
     /// Of the measured frequency response.
     Frequency(Note),
-    /// Nobody recorded the gains, and the signals do not tell them.
+    /// The gains were not recorded, and the signals do not determine them.
     GainsAreRelative,
     /// The recording itself runs away.
     RecordingGrows {
@@ -31,7 +31,7 @@ pub enum Warning {
         /// Factors on the grip, with what happens.
         fails: Vec<(f64, Outcome)>,
     },
-    /// The canceller takes out too much at rest, in words.
+    /// The canceller subtracts too much at rest, in words.
     OverCancelling(String),
     /// The verdict changes with the gain more than once between these mu*lambda.
     Flickers {
@@ -40,14 +40,14 @@ pub enum Warning {
         /// To here.
         highest: f64,
     },
-    /// Beyond the edge it is stable again.
+    /// Above the stability limit it is stable again.
     ReturnsToStable {
         /// At this mu*lambda.
         gain: f64,
     },
-    /// The edge depends on the dither's amplitude.
+    /// The stability limit depends on the dither's amplitude.
     AmplitudeDependent {
-        /// Edge (mu*lambda) and the dither's RMS of each amplitude.
+        /// Stability limit (mu*lambda) and the dither's RMS of each amplitude.
         edges: Vec<(f64, f64)>,
     },
 }

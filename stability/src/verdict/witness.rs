@@ -1,18 +1,18 @@
-//! One way of asking whether a gain is stable, with what it says.
+//! One method that tests whether a gain is stable, with its result.
 
 use super::word::{Method, Word};
 use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
 use serde::Serialize;
 
-/// One way of asking, with what it says.
+/// One method, with its result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Witness {
     /// Such as `the loop run again with a grip 1.15 times as firm`.
     pub name: String,
     /// By which method.
     pub method: Method,
-    /// Factor on the grip; `None` for what was measured with the hand as it was.
+    /// Factor on the grip; `None` for measurements with the recorded hand.
     pub grip: Option<f64>,
     /// At the gain asked about.
     pub verdict: Word,
@@ -22,15 +22,15 @@ pub struct Witness {
     pub critical_gain: Option<f64>,
     /// Highest mu*lambda up to which it is known to be stable.
     pub at_least: Option<f64>,
-    /// Frequency on the edge, Hz; 0 where it runs away without oscillating; `None` where it is not known.
+    /// Frequency at the stability limit, Hz; 0 for a run-away without oscillation; `None` where it is not known.
     pub frequency_hz: Option<f64>,
-    /// What is seen beyond the edge.
+    /// The outcome above the stability limit.
     #[serde(skip)]
     pub beyond: Option<Outcome>,
 }
 
 impl Witness {
-    /// Of the loop run again.
+    /// Of the re-simulation.
     pub(super) fn of_run(name: String, grip: f64, at_asked: &Outcome, edge: &Edge) -> Witness {
         Witness {
             name,
@@ -45,13 +45,13 @@ impl Witness {
         }
     }
 
-    /// Where its stable range ends: at an edge, or where a clamp comes first.
+    /// Where its stable range ends: at a stability limit, or where a clamp comes first.
     pub(super) fn end(&self) -> Option<f64> {
         let limited = matches!(self.beyond, Some(Outcome::Limited { .. }));
         self.critical_gain.or(self.at_least.filter(|_| limited))
     }
 
-    /// What it says at the gain: a gain beyond its edge is not stable, even where one run there looks so.
+    /// Its verdict at the gain: a gain above its stability limit is not stable, even where one run there looks so.
     pub(super) fn word_at(&self, gain: f64) -> Word {
         match (self.verdict, self.end()) {
             (Word::Stable, Some(end)) if gain >= end => self.beyond.as_ref().map_or(Word::Unstable, Word::of),

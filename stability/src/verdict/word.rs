@@ -15,7 +15,7 @@ pub enum Word {
     Unstable,
     /// A clamp or the travel decides, not the loop.
     Limited,
-    /// The recording does not tell.
+    /// The recording gives no answer.
     CannotTell,
 }
 
@@ -47,7 +47,7 @@ impl Word {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The loop run again with the models in the bag.
+    /// Re-simulation with the models in the bag.
     Resimulation,
     /// The measured frequency response.
     Frequency,

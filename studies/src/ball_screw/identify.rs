@@ -54,7 +54,7 @@ fn by_curves(curves: &Transition) -> impl Fn(f64, f64) -> f64 + '_ {
     |reach, q| 0.5 * curves.rise(reach, 2.0 * reach).force - curves.rise(reach, reach - q).force
 }
 
-/// RMS over loops that nobody measured, as a share of their force.
+/// RMS over loops that were not measured, as a share of their force.
 fn error(law: &Law, unseen: &[f64], falling: Falling) -> f64 {
     let (mut sum, mut all) = (0.0, 0.0);
     for reach in unseen {

@@ -1,7 +1,7 @@
 //! Paper 000 reproduced: the ball-screw axis, its friction and its controllers, figure by figure.
 //!
-//! No constant and no curve of the rig survives in the text that we have: every value is ours, and the paper's statements about shape
-//! and order are what is held against.
+//! No constant and no curve of the rig survives in the text that we have: every value is ours, and is compared with the paper's statements about
+//! shape and order.
 
 mod axis;
 mod drift;

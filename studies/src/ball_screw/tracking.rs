@@ -62,7 +62,7 @@ fn wanted(amplitude: f64, hz: f64, t: f64) -> Reference {
     }
 }
 
-/// What a controller is told: the axis with another law, and friction that is not quite its own.
+/// The controller's model: the axis with another law, and friction that is not quite its own.
 fn known(friction: Friction, share: f64) -> Result<AxisModel, StudyError> {
     let mut model = axis(friction)?;
     for element in &mut model.elements {
@@ -112,7 +112,7 @@ fn identified(found: &Found) -> Result<Scenario, StudyError> {
     })
 }
 
-/// The axis as it is, as a slave that a force drives.
+/// The true axis, as a slave that a force drives.
 fn device(model: &Model) -> Result<Device, StudyError> {
     let mut model = model.clone();
     model.outputs.iter_mut().for_each(|o| o.noise = NOISE);

@@ -22,7 +22,7 @@ pub(crate) const STUDY: Study = Study {
 
 /// Where the published numbers stand.
 const PAPER: &str = "Janot, Gautier & Brunot 2019";
-/// Bar on the error of the found model on the unseen record, %.
+/// Bar on the error of the found model on the held-out record, %.
 const BAR: f64 = 2.9;
 
 fn run(context: &Context) -> Result<Report, StudyError> {

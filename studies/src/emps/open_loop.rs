@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Bar on the error in the record with the pulses, mm.
 const BAR: f64 = 3.5;
-/// Numbers that the refit may move, where a model has them.
+/// Parameters that the refit may move, where a model has them.
 const NUMBERS: [&str; 11] = [
     "bodies.carriage",
     "elements.viscous.damping",
@@ -31,7 +31,7 @@ const ROUNDS: usize = 30;
 /// See [`ROUNDS`].
 const DIFFERENCE: f64 = 1e-4;
 
-/// The published models as they are, and a found one as it is and with its numbers refitted to the training record's position.
+/// The published models unchanged, and a found one both unchanged and with its parameters refitted to the training record's position.
 pub(super) fn run(report: &mut Report, context: &Context, found: &Model, train: &Record, pulses: &Record) -> Result<(), StudyError> {
     let error = |model: &Model| -> Result<[f64; 2], StudyError> { Ok([rmse(model, train)?, rmse(model, pulses)?]) };
     for (what, file) in [("symmetric form", "symmetric.toml"), ("asymmetric form", "asymmetric.toml")] {
@@ -79,7 +79,7 @@ fn driven(model: &Model) -> Model {
     model
 }
 
-/// A model with its numbers fitted to a record's position by Levenberg-Marquardt steps.
+/// A model with its parameters fitted to a record's position by Levenberg-Marquardt steps.
 fn refitted(mut model: Model, record: &Record) -> Result<Model, StudyError> {
     let paths: Vec<&str> = NUMBERS.iter().copied().filter(|path| model.values_at(path).is_ok()).collect();
     let moved = |model: &Model, steps: &[f64]| -> Result<Model, StudyError> {

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Filter on every column: order, Hz.
 const PARALLEL: (usize, f64) = (4, 40.0);
-/// One sample in so many.
+/// One in this number of samples is kept.
 const DECIMATE: usize = 10;
 /// Decimated samples at both ends that the filters spoil.
 const ENDS: usize = 5;
@@ -81,7 +81,7 @@ pub(super) fn error_of(record: &Record, form: Form, numbers: &[f64]) -> f64 {
     relative(&force, &predicted)
 }
 
-/// Error of a model that is moved as the record says and asked for the reaction, %.
+/// Error of a model that is moved along the record and asked for the reaction, %.
 pub(super) fn error_of_model(record: &Record, model: &Model) -> Result<f64, StudyError> {
     let failed = |e: &dyn std::fmt::Display| StudyError::Diagnosis(format!("{}: {e}", model.name));
     let predicted = simulate(model, &[&record.position], 1.0 / RATE, &Options::default()).map_err(|e| failed(&e))?;

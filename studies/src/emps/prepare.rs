@@ -1,6 +1,6 @@
 //! The records as the diagnosis takes them: strokes between reversals.
 //!
-//! A position is differentiated twice on its way to a force, so that its noise needs a low-pass; that blurs the kink that dry friction makes at
+//! A position is differentiated twice on its way to a force, so that its noise needs a low-pass. The filter blurs the kink that dry friction makes at
 //! a reversal, over some milliseconds, and a diagnosis would find that blur. So strokes are cut where it ends.
 
 use crate::{StudyError, csv_columns};
@@ -19,7 +19,7 @@ const ENDS: usize = 50;
 const BLUR: usize = 8;
 /// Samples of a stroke, at least.
 const SHORTEST: usize = 200;
-/// One sample in so many is kept: the position holds nothing above the low-pass.
+/// One in this number of samples is kept: the position holds nothing above the low-pass.
 const THIN: usize = 2;
 
 /// A record.

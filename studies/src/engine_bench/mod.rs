@@ -1,5 +1,5 @@
-//! Paper 003 as a whole: a bench recorded on the graph, identified from its bags in the paper's way, validated as the paper validates, and its
-//! observer beside an extended Kalman filter and a derivative.
+//! Paper 003 as a whole: a bench recorded on the graph, identified from its bags in the paper's way, and validated as the paper validates. Its
+//! observer is compared with an extended Kalman filter and a derivative.
 
 mod compare;
 mod page;

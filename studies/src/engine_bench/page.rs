@@ -1,4 +1,4 @@
-//! The page: the paper's figures as far as its text tells them, and ours.
+//! The page: the paper's figures where its text gives them, and ours.
 
 use super::told::Told;
 use super::user_force;
@@ -9,7 +9,7 @@ use backdrive_report::{Cell, Dash, Figure, Page, Plot, Series, Table, Tone};
 /// Rows of a plot, at most about this many.
 const ROWS: usize = 3000;
 
-/// Every so many values, so that a plot has at most [`ROWS`].
+/// One in several values, so that a plot has at most [`ROWS`].
 fn thin(values: &[f64]) -> Vec<f64> {
     values.iter().step_by((values.len() / ROWS).max(1)).copied().collect()
 }

@@ -1,4 +1,4 @@
-//! What a bench told.
+//! The reports of a bench.
 
 use super::compare::Comparison;
 use super::world::World;

@@ -8,7 +8,7 @@ use backdrive_nodes::graph::{Graph, Overrides};
 use backdrive_signal::statistics::{correlation, rms};
 use std::path::Path;
 
-/// What the observer told of a master.
+/// The observer's estimates of a master.
 pub struct Told {
     /// The master.
     pub name: &'static str,

@@ -37,7 +37,7 @@ fn bench(text: &str) -> Result<Model, StudyError> {
     Ok(model)
 }
 
-/// The model file with LuGre friction in the place of its own: about the true slope at a reversal and level of sliding.
+/// The model file with LuGre friction instead of its own: about the true slope at a reversal and level of sliding.
 fn lugre(text: &str) -> Result<String, StudyError> {
     let mut document: DocumentMut = text.parse().map_err(|e| StudyError::File(format!("{FILE}: {e}")))?;
     for element in document.get_mut("elements").and_then(Item::as_array_of_tables_mut).into_iter().flat_map(|t| t.iter_mut()) {
@@ -59,7 +59,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         // N m: the torque meter's 5 N m to 0.1 %.
         output.noise = 5e-3;
     }
-    // Motions that turn within turns, as the paper's Fig. 6, below and beyond the way within which friction lets go; its 0.2 Hz tail.
+    // Motions that turn within turns, as the paper's Fig. 6, below and beyond the presliding displacement; its 0.2 Hz tail.
     let drives = [
         Drive {
             name: "small",

@@ -80,7 +80,7 @@ fn bench(seed: u64) -> Result<(Model, Hidden), StudyError> {
             shaft["kind"] = value("backlash");
             shaft["gap"] = value(draw.between(2e-3, 5e-3));
             shaft["damping"] = value(12.0);
-            // The gap stands in the place of the damper too.
+            // The gap replaces the damper too.
             elements.retain(|e| e.get("name").and_then(Item::as_str) != Some("shaft_damping"));
             for output in document.get_mut("outputs").and_then(Item::as_array_of_tables_mut).into_iter().flat_map(|t| t.iter_mut()) {
                 if output.contains_key("element") {
@@ -116,7 +116,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let mut first = Model::load(&device(FILE))?;
     first.axes.clear();
     let mut report = Report::new("Paper 003, told blind: a linear shaft");
-    // The two machines against each other about standstill, below and above the torsional mode of 36 Hz; unseen: another draw of phases, and slow.
+    // The two machines against each other about standstill, below and above the torsional mode of 36 Hz; held out: another draw of phases, and slow.
     let drives = [
         Drive {
             name: "broad",

@@ -44,7 +44,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         // m, of the current and the encoder's interpolation together: a quarter of the encoder's step.
         output.noise = 5e-7;
     }
-    // Slow and large, both ways; the same sweep at two magnitudes; unseen: impacts, as the paper verifies, and a larger sweep.
+    // Slow and large, both ways; the same sweep at two magnitudes; held out: impacts, as the paper verifies, and a larger sweep.
     let drives = [
         Drive {
             name: "slow",

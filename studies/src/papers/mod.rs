@@ -1,8 +1,8 @@
-//! The papers' own stories, told blind: recordings made with a paper's last model, handed over with its first one.
+//! The papers' own stories, blind: recordings made with a paper's last model, handed over with its first one.
 //!
-//! [`Story::record`] writes recordings, set and first model into the folder `set` of the results, and what is true into `truth.json`
-//! beside that folder. [`walk`] diagnoses from the first model, puts the found model in the place of the first one and asks again, until nothing
-//! is missing. Only then [`score`] opens `truth.json`.
+//! [`Story::record`] writes recordings, set and first model into the folder `set` of the results, and what is true into `truth.json` beside that
+//! folder. [`walk`] diagnoses from the first model, replaces the first model by the found one and repeats this, until nothing is missing. Only then
+//! [`score`] opens `truth.json`.
 
 pub(crate) mod ball_screw;
 pub(crate) mod engine_bench;
@@ -27,13 +27,13 @@ const TRUTH: &str = "truth.json";
 /// Samples of the true device for each that is recorded.
 const FINER: usize = 8;
 
-/// A step of a paper's path: physics that its last model has and its first one has not.
+/// A step of a paper's path: effects that its last model has and its first one has not.
 pub(super) struct Step {
-    /// What the paper says.
+    /// The paper's value.
     pub paper: &'static str,
-    /// Names of physics that are this one, or that this one is a case of.
+    /// Names of effects that are this one, or that this one is a case of.
     pub accept: &'static [&'static str],
-    /// The place, and others at which it is the same device for whoever drives and measures this one.
+    /// The place, and others at which it is the same device for its driver and its measurements.
     pub places: &'static [[&'static str; 2]],
 }
 
@@ -123,9 +123,9 @@ impl Story<'_> {
 
 /// How far a walk goes.
 pub(super) struct Walk<'a> {
-    /// How many physics the diagnoses from the first model may add at once: one diagnosis for each of these numbers.
+    /// How many effects the diagnoses from the first model may add at once: one diagnosis for each of these numbers.
     pub effects: &'a [usize],
-    /// How often the found model is put in the place of the one before, at most.
+    /// How often the found model replaces the one before, at most.
     pub again: usize,
     /// s, how long one diagnosis searches at most.
     pub effort: f64,
@@ -133,7 +133,7 @@ pub(super) struct Walk<'a> {
 
 /// What a diagnosis named.
 pub(super) struct Named {
-    /// The physics.
+    /// The effect.
     pub physics: String,
     /// The place.
     pub place: String,
@@ -154,11 +154,11 @@ impl Named {
 pub(super) struct Walked {
     /// What was named on the way to the last model.
     pub named: Vec<Named>,
-    /// Folder of the diagnosis from the first model that predicted the unseen records best.
+    /// Folder of the diagnosis from the first model that predicted the held-out records best.
     pub best: String,
 }
 
-/// The set of `out` diagnosed from the first model; then from the found one that predicts the unseen records best, and so on until nothing is
+/// The set of `out` diagnosed from the first model; then from the found one that predicts the held-out records best, and so on until nothing is
 /// missing.
 pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<Walked, StudyError> {
     let out = outer.out;
@@ -199,7 +199,7 @@ pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<
     Ok(Walked { named, best })
 }
 
-/// A line of a diagnosis: what it says, the held-out error as given and as diagnosed.
+/// A line of a diagnosis: its verdict, the held-out error as given and as diagnosed.
 fn told(report: &mut Report, name: &str, verdict: &Verdict) {
     let held = &verdict.held_out;
     let [before, refit, after, floor] =

@@ -35,8 +35,8 @@ const STEPS: &[Step] = &[
     Step { paper: "backlash, 0.336 mm", accept: &["backlash"], places: &[["ram", "disc"]] },
 ];
 
-// With c1 between disc and ground, the force on the disc is that of b1, c1, and c in series with b. A damper d between flywheel and ground gives
-// the same one at every frequency with c' = c + c1, b' = b (c'/c)^2, d = c' c1/c: no measurement at the ram tells them apart.
+// With c1 between disc and ground, the force on the disc is that of b1, c1, and c in series with b. A damper d between flywheel and ground gives the
+// same one at every frequency with c' = c + c1, b' = b (c'/c)^2, d = c' c1/c: no measurement at the ram distinguishes them.
 
 /// A model whose only output is the force, as on the rig.
 fn rig(name: &str) -> Result<Model, StudyError> {
@@ -53,7 +53,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         // N, a load cell of some kN.
         output.noise = 1.0;
     }
-    // The rig's band, 0.1 to 35 Hz, at strokes that are chosen; unseen are the frequencies whose time plots the paper shows.
+    // The rig's band, 0.1 to 35 Hz, at strokes that are chosen; held out are the frequencies whose time plots the paper shows.
     let drives = |[large, middle, small]: [&str; 3], [slow, fast, faster]: [&str; 3]| {
         let sweep =
             |name, stroke: &str, rest: &str| Drive { name, held_out: false, inputs: vec![format!("sweep:amplitude={stroke},{rest}")] };

@@ -1,5 +1,5 @@
-//! The compensator as numbers: eq (2), the paper's tables, and the network that the numbers make. Of numbers that the paper's text as we have it does
-//! not settle: (R) recovered from others that it states, (A) ambiguous, the readings are named, (L) lost, ours stands in its place.
+//! The compensator as parameters: eq (2), the paper's tables, and the network that they make. Marks of parameters that the paper's text as we have it
+//! does not settle: (R) recovered from others that it states, (A) ambiguous, the readings are named, (L) lost, ours replaces it.
 
 use backdrive_plant::elements::{Backlash, Dahl, Damper, Inerter, Law, Spring, Stribeck};
 use backdrive_plant::model::{Body, Element, Fragment, Model, Place};
@@ -19,7 +19,7 @@ const STRIBECK_VELOCITY: f64 = 1e-3;
 /// Friction in motion and at rest over h, N: the bench measurements.
 const FRICTION: [f64; 2] = [1.75, 2.0];
 
-/// The numbers of the device with each of its oils, at the lever's end.
+/// The parameters of the device with each of its oils, at the lever's end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compensator {
     /// Stiffness of the gearbox, N/m.
@@ -72,7 +72,7 @@ pub const TABLE_3_RUN_1: Compensator = Compensator {
     oils: [[6382.0, 1398.0], [4423.0, 1104.0], [3062.0, 804.0], [1375.0, 364.0]],
 };
 
-/// Table III, run 2: with backlash, fitted up to 36 Hz; the numbers of the model files. c of SAE-20 is 3035 or 3350, c1 of SAE-30 1106, 1160 or
+/// Table III, run 2: with backlash, fitted up to 36 Hz; the parameters of the model files. c of SAE-20 is 3035 or 3350, c1 of SAE-30 1106, 1160 or
 /// 1016, of SAE-20 808 or 880, of SAE-10 370 or 307 (A).
 pub const TABLE_3_RUN_2: Compensator = Compensator {
     k: 861e3,

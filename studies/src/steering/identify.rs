@@ -8,7 +8,7 @@ use backdrive_plant::correlation::{Resolution, admittance_of};
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Whether the modulus in (3) stands as it is or squared (A).
+/// Whether the modulus in (3) is used directly or squared (A).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cost {
     /// Sum of moduli.
@@ -32,7 +32,7 @@ const REACH: f64 = 2.0;
 pub struct Fit {
     /// The device.
     pub device: Compensator,
-    /// Cost at its numbers.
+    /// Cost at its parameters.
     pub cost: f64,
     /// Root of the mean squared modulus of `(Y - E)/E`.
     pub rms: f64,

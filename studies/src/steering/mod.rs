@@ -1,4 +1,5 @@
-//! Paper 001's system whole: the compensator on its rig, the admittances of four oils, its numbers found again from them, and the paper's figures.
+//! Paper 001's system whole: the compensator on its rig, the admittances of four oils, its parameters identified again from them, and the paper's
+//! figures.
 
 pub mod bench;
 pub mod device;
@@ -79,7 +80,7 @@ fn measure(quick: bool) -> Result<Results, StudyError> {
     // As in the paper h stays at what the fit without backlash found; here at the value of Table II.
     let from = Compensator { h: TABLE_2.h, ..start(&TABLE_3_RUN_2) };
     let with_gap = [Stiffness, Inertance, Parasitic, Gap];
-    // Run 1 is a device of its own numbers; both runs take all strokes together.
+    // Run 1 is a device with its own parameters; both runs take all strokes together.
     let mut first = Vec::new();
     for scale in scales {
         first.extend(bench.curves(&TABLE_3_RUN_1, *scale, &frequencies)?);

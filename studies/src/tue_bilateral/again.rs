@@ -1,7 +1,7 @@
-//! The sessions run again: both levers as they were diagnosed, coupled by the law that was recovered, in the records that no fit has seen.
+//! Re-simulation of the sessions: both levers with their diagnosed models, coupled by the law that was recovered, in the held-out records.
 //!
-//! Three ways, from the one that gives least to the one that gives most. A hand that is only a torque has to be integrated twice, so that what the
-//! friction is off by drifts away wherever no spring holds the levers; a hand is no torque, but a spring and a damper that are moved.
+//! Three ways, from the one that gives least to the one that gives most. The motion of a hand that is only a torque has to be integrated twice, so
+//! the error of the friction makes it drift wherever no spring holds the levers. A hand is no torque, but a spring and a damper that are moved.
 
 use super::environment::Environment;
 use super::record::{ENDS, Record, mean};
@@ -21,7 +21,7 @@ const ARM: f64 = 0.075;
 /// Share of the variance that is wanted.
 const WANTED: f64 = 0.9;
 
-/// The diagnosed levers: moved as they were measured, they tell the torque that was needed.
+/// The diagnosed levers: moved along their measured motion, they give the torque that was needed.
 pub(super) struct Levers {
     pub(super) master: Model,
     pub(super) slave: Model,
@@ -45,7 +45,7 @@ fn pushed(moved: &Model) -> Model {
     }
 }
 
-/// The lever alone as it was moved: the torque that something had to push it with.
+/// The lever alone along its recorded motion: the torque that something had to push it with.
 fn needed(lever: &Model, motion: &[f64], period_s: f64) -> Result<Vec<f64>, StudyError> {
     let alone = Model {
         inputs: vec![Input::ideal("position", InputKind::Motion, 0, Hold::Cubic)],
@@ -67,7 +67,7 @@ struct Given {
     environment: Option<Environment>,
     /// Torque on the slave besides its motor's, N m, where it is as recorded; what its gauge is off by.
     contact: Vec<f64>,
-    /// Whether the master is moved as it was recorded.
+    /// Whether the master is moved along its recorded motion.
     master_moved: bool,
 }
 
@@ -118,7 +118,7 @@ fn followed(simulated: &[f64], recorded: &[f64]) -> f64 {
     1.0 - variance(&left) / variance(recorded)
 }
 
-/// The unseen records run again, three ways.
+/// Re-simulation of the held-out records, three ways.
 pub(super) fn again(report: &mut Report, records: &[Record], judged: &[Judged], levers: &Levers, hand_gain: f64) -> Result<(), StudyError> {
     let of_kind = |kind: &str| records.iter().filter(|r| r.name.starts_with("a_") && r.name.contains(kind)).collect::<Vec<&Record>>();
     let environments: Vec<(&str, Option<Environment>)> =

@@ -17,7 +17,7 @@ pub(super) struct Environment {
 
 /// Places that are tried, from the lowest to the highest position of the slave.
 const PLACES: usize = 200;
-/// Every so manieth row is looked at.
+/// One in this number of rows is used.
 const EVERY: usize = 10;
 
 impl Environment {
@@ -33,7 +33,7 @@ impl Environment {
         record.slave.iter().zip(&speed).map(|(x, v)| self.torque(*x, *v)).collect()
     }
 
-    /// Of the records of one kind: the mean of what each says by itself. The gauge's zero is its own in each.
+    /// Of the records of one kind: the mean of their individual results. The gauge's zero is its own in each.
     pub(super) fn fit(records: &[&Record]) -> Option<Environment> {
         let all: Vec<Environment> = records.iter().filter_map(|record| best_place(record, None)).collect();
         let of = |pick: fn(&Environment) -> f64| mean(&all.iter().map(pick).collect::<Vec<f64>>());

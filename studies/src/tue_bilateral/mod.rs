@@ -1,5 +1,6 @@
-//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, how
-//! late the hand's torque is recorded, which law couples them, whether they were stable with it, and the sessions run again with what was found.
+//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia. The study finds what they have besides, which gauge
+//! is dead, how late the hand's torque is recorded, which law couples them and whether they were stable with it. It then re-simulates the sessions
+//! with what was found.
 
 mod again;
 mod environment;
@@ -36,7 +37,8 @@ const COLUMNS: [&str; 10] = [
     "slave_gauge_b [V]",
     "environment_torque [N m]",
 ];
-/// Sample rate, Hz; corner of the zero-phase filter on positions and torques, Hz; every so manieth sample is kept, and so many are left out at either end.
+/// Sample rate, Hz; corner of the zero-phase filter on positions and torques, Hz; decimation of the samples, and the number of samples omitted at either
+/// end.
 const RATE: f64 = 2000.0;
 /// See [`RATE`].
 const CORNER: f64 = 100.0;
@@ -52,7 +54,7 @@ const DRY: [(&str, &str); 7] = [
     ("friction_deficit", "coulomb"),
     ("preisach_lugre", "coulomb"),
 ];
-/// Where the figures stand that nobody published.
+/// Source of the figures that were not published.
 const SOURCE: &str = "regression of the same records";
 
 /// What the records say by themselves.
@@ -110,7 +112,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// What the audit says of the gauges.
+/// The audit's result on the gauges.
 fn gauges(report: &mut Report, context: &Context) -> Result<(), StudyError> {
     for lever in ["master", "slave"] {
         let (set, model) = (format!("set-{lever}-gauges.toml"), format!("{lever}-gauges.toml"));
@@ -163,7 +165,7 @@ fn lever(context: &Context, name: &str) -> Result<Model, StudyError> {
     diagnosed_model(context, &Ask { name, set: "", model: "", without: &[], effects: 0, effort: 0.0 })
 }
 
-/// Of each unseen record, whether the diagnosed model leaves at most half of what the inertia alone, refitted, leaves.
+/// For each held-out record, whether the residual of the diagnosed model is at most half of that of the inertia alone, refitted.
 fn halved(verdict: &Verdict) -> Vec<bool> {
     let errors = verdict.held_out.per_record.iter();
     errors.filter_map(|r| Some(r.nrmse_after? <= 0.5 * r.nrmse_refit?)).collect()
@@ -287,8 +289,8 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
 /// Speed below which the sign of a speed is not sure, rad/s.
 const SLOW: f64 = 0.005;
 
-/// Time constant, s, with which a signal follows another one through a low-pass of first order, and gain and offset between the two: the next
-/// sample is a share of the last one and of the other signal.
+/// Time constant, s, with which a signal follows another one through a low-pass of first order, and gain and offset between the two. The next sample
+/// is a share of the last one and of the other signal.
 fn follows(from: &[f64], signal: &[f64]) -> Result<(f64, [f64; 2]), StudyError> {
     let n = signal.len().saturating_sub(1);
     let numbers = solved(&[&signal[..n], &from[1..], &vec![1.0; n]], &signal[1..])?;

@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-/// Where the gains stand that nobody published.
+/// Place of the gains that were not published.
 const UNPUBLISHED: &str = "unpublished";
 /// Records of the short part: one of each gains.
 const SHORT: [&str; 3] = ["m2_a_spring.csv", "m2_b_foam.csv", "m2_c_rigid.csv"];
@@ -144,7 +144,7 @@ fn half_width(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| t * deviation / n.sqrt())
 }
 
-/// The laws of master and slave of a record, as the other records of the same gains have them: means of their numbers.
+/// The laws of master and slave of a record, as the other records of the same gains have them: means of their parameters.
 pub(super) fn laws_without(judged: &[Judged], name: &str) -> Option<[Law; 2]> {
     let group = name.get(..1)?;
     let others: Vec<&Coupling> = judged.iter().filter(|j| j.name.starts_with(group) && j.name != name).map(|j| &j.coupling).collect();

@@ -3,7 +3,7 @@ use crate::coupling::{Conditions, passivity, position_position, wave, wave_line}
 
 const PERIOD: f64 = 1e-3;
 
-/// Forces act within the step in which they are told.
+/// Forces act within the step in which they are computed.
 const AT_ONCE: Conditions = Conditions { period_s: PERIOD, round_trip_s: 0.4, held_steps: 0 };
 
 /// A wall that only pushes, with damping, at 5 mm.
@@ -114,7 +114,7 @@ fn a_slave_with_energy_to_spare_is_where_it_shall_be() {
     assert!((come - motion[599]).abs() < 1e-9, "{come} of {}", motion[599]);
 }
 
-/// A hand (mass, damper, spring to a place that it wants) and a wall on both ends of a law; the energy of its motion after `steps`.
+/// A hand (mass, damper, spring to its intended place) and a wall on both ends of a law; the energy of its motion after `steps`.
 fn swings(settings: &position_position::Settings, delay: u64, steps: u64) -> (f64, f64) {
     let conditions = Conditions { period_s: PERIOD, round_trip_s: (2 * delay + 1) as f64 * PERIOD, held_steps: 1 };
     let mut near = position_position::NearSide::new(settings, &conditions);
@@ -134,7 +134,7 @@ fn swings(settings: &position_position::Settings, delay: u64, steps: u64) -> (f6
         back.send(step, packet);
         (speed, tip) = ((command - tip) / PERIOD, command);
         let wanted = if step < 1000 { 0.01 } else { 0.0 };
-        // Implicit in the hand's own damper and spring, the law's force held as it is.
+        // Implicit in the hand's own damper and spring, the law's force held constant.
         v = (mass * v + PERIOD * (force - stiffness * (x - wanted))) / (mass + PERIOD * (damping + stiffness * PERIOD));
         x += PERIOD * v;
         put_in += (-force * v + felt * speed) * PERIOD;

@@ -1,4 +1,4 @@
-//! The laws held against what they promise: energy, closed forms, bounds.
+//! Tests of what the laws guarantee: energy, closed forms, bounds.
 
 mod energy;
 mod line;
@@ -54,8 +54,8 @@ impl Way {
 /// Links that every law is tried on: (delay there, delay back, jitter, loss), in steps.
 const LINKS: [(u64, u64, u64, f64); 5] = [(0, 1, 0, 0.0), (40, 60, 0, 0.0), (200, 200, 0, 0.0), (80, 80, 80, 0.0), (30, 30, 20, 0.3)];
 
-/// What a law does between a given motion of the master and a slave that follows its command at once and feels `contact` of
-/// (position, velocity): per step (master's velocity, force on the master, slave's velocity, force on the slave).
+/// The response of a law to a given motion of the master, with a slave that follows its command at once and feels `contact` of (position, velocity).
+/// Per step: (master's velocity, force on the master, slave's velocity, force on the slave).
 fn driven(
     near: &mut dyn Near,
     far: &mut dyn Far,

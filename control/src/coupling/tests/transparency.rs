@@ -7,8 +7,8 @@ const MASTER: f64 = 0.1;
 const STIFFNESS: f64 = 300.0;
 const DAMPING: f64 = 4.0;
 
-/// F_hand/v of a master of ideal mass through the law, with a slave that is where it shall be on a spring and a damper; no delay
-/// but the one step that a loop needs.
+/// F_hand/v of a master of ideal mass through the law, with a slave that is exactly at its command on a spring and a damper; no delay but the one
+/// step that a loop needs.
 fn felt(settings: &Settings, hz: f64, period_s: f64) -> Complex<f64> {
     let (mut near, mut far) = (NearSide::new(settings), FarSide::new(settings));
     let (mut there, mut back) = (Way::constant(0), Way::constant(1));
@@ -73,7 +73,7 @@ fn with_exact_models_the_hand_feels_the_environment() {
         let outside = environment(hz);
         let off = |share: f64| (closed_form(&settings, share, hz) - outside).norm() / outside.norm();
         assert!(off(1.0) < 1e-12, "{hz} Hz: {}", off(1.0));
-        // What is left is in proportion to the inertia that is left.
+        // The error is in proportion to the remaining inertia.
         assert!((off(0.9) / off(0.0) - 0.1).abs() < 0.02, "{hz} Hz: {} of {}", off(0.9), off(0.0));
     }
     // And so it is where it runs.

@@ -45,7 +45,7 @@ impl NodeReader<'_> {
         Ok(DeviceFiles { model, fragment, substeps, real_sensors, grip_changes: Vec::new() })
     }
 
-    /// `environment_on`: what the device touches is attached at these bodies, once each, in the place of the user's body of every axis.
+    /// `environment_on`: what the device touches is attached at these bodies, once each, instead of the user's body of every axis.
     pub(super) fn touched_elsewhere(&self, table: &mut Table, device: &mut DeviceFiles) -> Result<(), FileError> {
         let Some(names) = table.string_or_strings("environment_on")? else { return Ok(()) };
         let Some(model) = &mut device.model else { return Ok(()) };

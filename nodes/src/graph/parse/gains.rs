@@ -31,8 +31,8 @@ pub(super) fn read_gains(top: &mut Table) -> Result<GainPlan, FileError> {
     Ok(plan)
 }
 
-/// Largest scale of position or force. From the weakest sensor to the strongest slave there are six decades: what is beyond is a slip of the
-/// pen, and its numbers would leave all bounds in a few steps.
+/// Largest scale of position or force. From the weakest sensor to the strongest slave there are six decades: a larger value is a typing error, and
+/// its results would leave all bounds in a few steps.
 const LARGEST_SCALE: f64 = 1e6;
 
 fn possible(table: &Table, key: &str, scale: f64) -> Result<(), FileError> {

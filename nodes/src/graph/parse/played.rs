@@ -51,8 +51,8 @@ impl NodeReader<'_> {
         Ok(Intent::Rest)
     }
 
-    /// One multisine for a master of several axes (read before): each axis gets phases of its own, for what two axes do
-    /// together cannot be told apart.
+    /// One multisine for a master of several axes (read before): each axis gets phases of its own, because the effects of two equal inputs cannot be
+    /// separated.
     fn for_each_axis(&self, excitation: &Excitation) -> Vec<Excitation> {
         let axes = self.graph.nodes.iter().find(|n| n.kind == NodeKind::Master).map_or(1, |n| n.axes);
         let own = |axis: usize| {

@@ -70,10 +70,10 @@ impl ClockWatch {
         }
     }
 
-    /// Lets go of a participant that is no longer used; its threads end in the background.
+    /// Releases a participant that is no longer used; its threads end in the background.
     pub fn retire(&self, old: Arc<Participant>) {
         std::thread::spawn(move || {
-            // Its ports are made anew one by one, and wait for theirs.
+            // Its ports are recreated one by one, and wait for theirs.
             std::thread::sleep(Duration::from_secs(2));
             drop(old);
         });

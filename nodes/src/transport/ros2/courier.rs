@@ -1,9 +1,8 @@
-//! Tells hosts that multicast does not reach of the participants on this one.
+//! Informs hosts that multicast does not reach of the participants on this one.
 //!
-//! A participant announces itself to the multicast group and to the well-known ports of its own host (RTPS 2.5,
-//! section 9.6.2.3). The courier listens on one of those ports and passes every announcement on, as it is, to the same
-//! ports of the named peers, and again every second, for theirs may start later. What follows the announcement is
-//! unicast in any case: it carries the addresses at which its sender is reached.
+//! A participant announces itself to the multicast group and to the well-known ports of its own host (RTPS 2.5, section 9.6.2.3). The courier listens
+//! on one of those ports and passes every announcement on, unchanged, to the same ports of the named peers. It repeats this every second, because
+//! theirs may start later. What follows the announcement is unicast in any case: it carries the addresses at which its sender is reached.
 
 use super::Network;
 use crate::transport::TransportError;
@@ -14,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Participants of a host that are told of each other by unicast; the middleware's own number.
+/// Participants of a host that are announced to each other by unicast; the middleware's own number.
 const SLOTS: u16 = 12;
 
 /// How often the announcements are passed on.
@@ -35,7 +34,7 @@ fn port(domain: u16, slot: u16) -> u16 {
 }
 
 impl Courier {
-    /// Starts to tell `network.peers`; `None` when there are none.
+    /// Starts to inform `network.peers`; `None` when there are none.
     ///
     /// # Errors
     /// No port of the domain is free on this host.

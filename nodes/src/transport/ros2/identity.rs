@@ -33,7 +33,7 @@ pub struct Member {
     pub key: Key,
 }
 
-/// What the supervisor tells the processes of a run, in a file that only their user can read.
+/// What the supervisor passes to the processes of a run, in a file that only their user can read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Known {
     /// This host's run.
@@ -212,7 +212,7 @@ impl Identity {
         if judged.is_some() || !self.0.several {
             return judged;
         }
-        // Another host may have begun, or begun again: then its old session is nobody's any more.
+        // Another host may have begun, or begun again: then its old session is no longer valid.
         let path = self.0.path.as_deref()?;
         let now = state(path);
         if now == others.read {
@@ -243,7 +243,7 @@ impl Known {
         serde_json::from_str(&text).map_err(|e| failed(&e))
     }
 
-    /// Writes it so that a reader has the old or the new one, and nobody but the user has any.
+    /// Writes it so that a reader has the old or the new one, and no other user has any.
     ///
     /// # Errors
     /// The system refuses.
@@ -356,7 +356,7 @@ mod tests {
         known.others = vec![("robot".to_string(), robot)];
         known.write(&path).unwrap();
         assert_eq!((here.judge(&topic, true, &first), here.judge(&topic, true, &second)), (ours("b2"), unknown("c3")));
-        // Started again: from then on the old session is nobody's.
+        // Started again: from then on the old session is not valid.
         known.others = vec![("robot".to_string(), again)];
         known.write(&path).unwrap();
         assert_eq!((here.judge(&topic, true, &second), here.judge(&topic, true, &first)), (ours("c3"), unknown("b2")));

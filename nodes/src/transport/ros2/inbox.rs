@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// A topic's speaker that is silent for this long gives way to another.
 const SPEAKER_SILENCE: Duration = Duration::from_millis(100);
 
-/// The same for what is told now and then.
+/// The same for topics that publish now and then.
 const TELLER_SILENCE: Duration = Duration::from_secs(2);
 
 /// How long a second publisher of a topic is listened for before the start: one that runs sends in this time, and one that was killed does not.
@@ -85,10 +85,10 @@ pub(super) struct Inbox {
 /// The inboxes of a node.
 pub(super) type Inboxes = Mutex<Vec<Weak<Mutex<Inbox>>>>;
 
-/// How often what has arrived is taken over where nobody asks: what is unread when its reliable writer ends is gone with it.
+/// How often arrived messages are taken over without a request: unread messages are lost when their reliable writer ends.
 const TAKE_OVER_EVERY: Duration = Duration::from_millis(2);
 
-/// Nothing lies in the middleware for so long; an age beyond it says that the wall clock was set, ns.
+/// Nothing stays in the middleware for this long; a larger age means that the wall clock was set, ns.
 const LONGEST_AGE_NS: i64 = 10_000_000_000;
 
 pub(super) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -122,8 +122,8 @@ pub(super) fn drain(inboxes: &Inboxes) {
     now.iter().for_each(|inbox| locked(inbox).drain());
 }
 
-/// When the middleware took something in, in CLOCK_MONOTONIC, ns. It says so by the wall clock, which may have been set since: then now is
-/// the best that is known.
+/// When the middleware took something in, in CLOCK_MONOTONIC, ns. Its time is from the wall clock, which may have been set since: then now is the
+/// best that is known.
 fn taken_in_ns(at: Timestamp) -> i64 {
     let age_ns = Timestamp::now().duration_since(at).to_nanoseconds();
     now_ns() - if (0..LONGEST_AGE_NS).contains(&age_ns) { age_ns } else { 0 }

@@ -9,11 +9,11 @@ pub const MAX_DOMAIN: u16 = 232;
 /// Where on the network the nodes of a graph meet.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Network {
-    /// DDS domain, 0 to [`MAX_DOMAIN`]; what other ROS tools are told by `ROS_DOMAIN_ID`.
+    /// DDS domain, 0 to [`MAX_DOMAIN`]; for other ROS tools the `ROS_DOMAIN_ID`.
     pub domain: u16,
     /// Addresses of this host's interfaces to use; all when empty.
     pub interfaces: Vec<Ipv4Addr>,
-    /// Hosts that are told of this one's nodes by unicast, for networks without multicast.
+    /// Hosts that are informed of this one's nodes by unicast, for networks without multicast.
     pub peers: Vec<Ipv4Addr>,
 }
 
@@ -23,7 +23,7 @@ pub enum NetworkError {
     /// No such domain.
     #[error("{from} = `{given}` is no domain: expected a whole number from 0 to {MAX_DOMAIN}")]
     Domain {
-        /// Who said so, such as `ROS_DOMAIN_ID`.
+        /// Its source, such as `ROS_DOMAIN_ID`.
         from: &'static str,
         /// What.
         given: String,

@@ -3,7 +3,7 @@
 use super::identity::{Run, Why};
 use std::time::{Duration, Instant};
 
-/// Publishers that a topic is remembered to have had in one run: one that was made anew has another identity on the network.
+/// Publishers that a topic is remembered to have had in one run: one that was recreated has another identity on the network.
 const REMEMBERED: usize = 4;
 
 /// What becomes of a message.
@@ -62,7 +62,7 @@ impl<G: Copy + PartialEq> Proven<G> {
 pub(super) struct First<G> {
     speaker: Option<(G, u64, Instant)>,
     silence: Duration,
-    /// Whether a publisher that was made anew goes on where it was; of samples two may count alike.
+    /// Whether a publisher that was recreated continues its count; of samples two may count alike.
     continues: bool,
 }
 
@@ -92,7 +92,7 @@ impl<G: Copy + PartialEq> First<G> {
         admission
     }
 
-    /// The middleware says that a publisher has gone.
+    /// The middleware reports that a publisher has gone.
     pub fn gone(&mut self, who: G) {
         self.speaker = self.speaker.filter(|(speaker, ..)| *speaker != who);
     }

@@ -58,7 +58,7 @@ pub fn listen(port: u16, on: &[Interface]) -> Option<UdpSocket> {
         sin_addr: libc::in_addr { s_addr: u32::from(GROUP).to_be() },
         sin_zero: [0; 8],
     };
-    // SAFETY: the values live as long as the calls, and have the sizes that are told.
+    // SAFETY: the values live as long as the calls, and have the stated sizes.
     let bound = unsafe {
         for option in [libc::SO_REUSEADDR, libc::SO_REUSEPORT] {
             libc::setsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, option, (&raw const yes).cast(), length);

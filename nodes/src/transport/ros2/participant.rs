@@ -31,7 +31,7 @@ pub(super) struct Participant {
     dds: DomainParticipant,
 }
 
-/// What other ROS tools are told of this node.
+/// What other ROS tools learn of this node.
 struct Presence {
     writer: DataWriterCdr<ParticipantEntitiesInfo>,
     node: NodeEntitiesInfo,
@@ -70,7 +70,7 @@ impl Participant {
         Ok(participant)
     }
 
-    /// Changes what other ROS tools are told of this node.
+    /// Changes what other ROS tools learn of this node.
     fn tell(&self, change: impl FnOnce(&mut NodeEntitiesInfo)) {
         let Some(presence) = &self.presence else { return };
         let mut presence = presence.lock().unwrap_or_else(PoisonError::into_inner);

@@ -31,7 +31,7 @@ impl SerializerAdapter<Bytes> for Raw {
 pub(super) enum Checked {
     /// Of this run, on this host or another, with the life of its publisher.
     Ours(Message, Run, u64),
-    /// Nobody asked whose it is.
+    /// Its owner was not asked for.
     Anybodys(Message),
     /// Not of this run; it was not read.
     Refused(Why),

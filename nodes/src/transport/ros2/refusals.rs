@@ -1,4 +1,4 @@
-//! What was refused on a topic: how often, of whom first, and when it is said.
+//! What was refused on a topic: how often, of whom first, and when it is reported.
 
 use super::identity::{Run, Why};
 use crate::transport::TransportError;
@@ -6,7 +6,7 @@ use backdrive_msgs::topic::{Kind, Topic};
 use rustdds::GUID;
 use std::time::{Duration, Instant};
 
-/// How often it is said again.
+/// How often it is reported again.
 const AGAIN: Duration = Duration::from_secs(1);
 
 /// Of a run on several hosts a name that is not known may be that of a host that has just begun: this long it is only refused.
@@ -17,7 +17,7 @@ const BEGINS: Duration = Duration::from_secs(2);
 pub(super) struct Refusals {
     count: u64,
     said: u64,
-    /// The first that is not said yet: who sent it, and what was wrong with it.
+    /// The first that is not reported yet: who sent it, and what was wrong with it.
     first: Option<(Option<GUID>, Why)>,
     /// A run that may be of a host that has just begun, and since when.
     unknown: Option<(Run, Instant)>,
@@ -125,7 +125,7 @@ mod tests {
         refusals.add(None, unknown, true);
         refusals.add(None, Why::Forged, true);
         assert!(refusals.complaint(&topic()).unwrap().to_string().contains("forges tags"));
-        // And of a run on one host nobody has just begun.
+        // And in a run on one host no host has just begun.
         let mut refusals = Refusals::default();
         refusals.add(None, unknown, false);
         assert!(refusals.complaint(&topic()).is_some());

@@ -15,7 +15,7 @@ use std::rc::Rc;
 pub(super) struct Sending {
     shared: Rc<Shared>,
     topic: Topic,
-    /// Who tells an event: the first part of its topic's name.
+    /// Who reports an event: the first part of its topic's name.
     speaker: String,
     names: Vec<String>,
     writer: RefCell<Writer>,

@@ -30,7 +30,7 @@ pub(super) struct Shared {
     pub(super) identity: Option<Identity>,
     pub(super) axes: HashMap<String, Vec<String>>,
     pub(super) participant: RefCell<Arc<Participant>>,
-    /// Counts the participants that this node has had; a port of an earlier one makes itself anew.
+    /// Counts the participants that this node has had; a port of an earlier one recreates itself.
     pub(super) life: Cell<u32>,
     pub(super) watch: RefCell<ClockWatch>,
     pub(super) bell: Arc<Bell>,
@@ -74,7 +74,7 @@ impl Shared {
         }
     }
 
-    /// What is left of the time to wait for acknowledgements.
+    /// Remaining time to wait for acknowledgements.
     pub(super) fn linger(&self) -> Duration {
         let until = self.linger_until.get().unwrap_or_else(|| Instant::now() + LINGER);
         self.linger_until.set(Some(until));

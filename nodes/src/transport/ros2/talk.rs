@@ -1,6 +1,6 @@
 //! Text between the supervisors of a run on several hosts: a topic of `std_msgs/String`.
 //!
-//! Best effort: all that is said is said again soon, and a lost word must not hold back the next.
+//! Best effort: every message is repeated soon, and a lost one must not hold back the next.
 
 use super::inbox::ringing;
 use super::node::Ros2;
@@ -67,12 +67,12 @@ impl Ends {
 }
 
 impl Talk {
-    /// Says something to everybody who is there now. What cannot be sent is dropped: all that is said is said again.
+    /// Sends a text to all present participants. What cannot be sent is dropped: everything is sent repeatedly.
     pub fn say(&self, text: &str) {
         let _ = self.ends.writer.write(Words { data: text.to_string() }, None);
     }
 
-    /// The next that was said, if there is something. What is not text is skipped.
+    /// The next message, if there is one. What is not text is skipped.
     pub fn hear(&self) -> Option<String> {
         self.ends.reader.set_waker(Some(self.waker.clone()));
         loop {
@@ -84,7 +84,7 @@ impl Talk {
         }
     }
 
-    /// Waits until something was said after the last look, or the time is over.
+    /// Waits until a message came after the last look, or the time is over.
     pub fn wait(&mut self, timeout: std::time::Duration) {
         self.shared.watch_clock();
         if self.life != self.shared.life.get()

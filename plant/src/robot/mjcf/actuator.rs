@@ -7,7 +7,7 @@ use crate::robot::found::Found;
 use crate::robot::xml::Element;
 use crate::tomlfile::{FileError, unknown};
 
-/// All that a class says of any actuator holds for every one.
+/// An attribute that a class sets for any actuator holds for every one.
 const TAGS: [&str; 12] =
     ["general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "adhesion", "dcmotor", "pid", "plugin"];
 

@@ -1,4 +1,4 @@
-//! `<default>`: classes of attributes, each with what the one around it says.
+//! `<default>`: classes of attributes, each with those of the enclosing class.
 
 use crate::elements::Range;
 use crate::robot::xml::Element;
@@ -23,7 +23,7 @@ struct Class<'a> {
 /// Index of a class.
 pub(super) type ClassIndex = usize;
 
-/// An element with what its class says.
+/// An element with the attributes of its class.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Styled<'a, 'd> {
     pub(super) element: Element<'a>,
@@ -67,7 +67,7 @@ impl<'a> Defaults<'a> {
         index.ok_or_else(|| element.error_at(attribute, unknown("class", name, self.classes.iter().map(|class| class.name))))
     }
 
-    /// An element with what its class says; `around` is the class of what it stands in.
+    /// An element with the attributes of its class; `around` is the class of the enclosing element.
     pub(super) fn styled<'d>(&'d self, element: Element<'a>, around: ClassIndex, tags: &'d [&'d str]) -> Result<Styled<'a, 'd>, FileError> {
         Ok(Styled { element, defaults: self, class: self.class(element, "class", around)?, tags })
     }
@@ -104,7 +104,7 @@ impl<'a> Styled<'a, '_> {
         self.text(name).map(|(element, text)| element.as_array(name, text)).transpose()
     }
 
-    /// Whether a limit is in force: as `flag` says, or by itself where the file has a range (`auto`).
+    /// Whether a limit is in force: as `flag` states, or automatically where the file has a range (`auto`).
     pub(super) fn limited(&self, flag: &str, range: &str, autolimits: bool) -> Result<bool, FileError> {
         match self.text(flag) {
             Some((_, "true")) => Ok(true),

@@ -10,7 +10,7 @@ use crate::tomlfile::{FileError, unknown};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::f64::consts::PI;
 
-/// Water, kg/m³: what a geom weighs whose file says nothing.
+/// Water, kg/m³: the density of a geom for which the file states none.
 const DENSITY: f64 = 1000.0;
 
 const SIMPLE: [&str; 5] = ["sphere", "capsule", "cylinder", "ellipsoid", "box"];

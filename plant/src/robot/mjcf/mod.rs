@@ -1,5 +1,5 @@
-//! MJCF: the models of MuJoCo. Of the format is read what describes bodies, joints, inertias, what a joint has of armature, friction and springs, and
-//! motors; the rest is remarked upon, and what would make other mechanics of it is refused.
+//! MJCF: the models of MuJoCo. Of the format is read what describes bodies, joints, inertias, motors, and a joint's armature, friction and springs.
+//! There is a remark for the rest, and an element that would change the mechanics is refused.
 //!
 //! The format is that of <https://mujoco.readthedocs.io/en/stable/XMLreference.html>. A body with several joints becomes a chain of links without mass.
 
@@ -64,7 +64,7 @@ fn option(section: Element, found: &mut Found) -> Result<(), FileError> {
     Ok(())
 }
 
-/// What is said of the sections that are not read.
+/// The remarks on the sections that are not read.
 fn left_aside(section: Element, remarks: &mut Remarks) -> Result<(), FileError> {
     let (message, matters) = match section.tag() {
         "compiler" | "default" | "worldbody" | "actuator" => return Ok(()),

@@ -18,7 +18,7 @@ pub(super) fn placement(of: &Styled, compiler: &Compiler) -> Result<Placement, F
 }
 
 pub(super) fn rotation(of: &Styled, compiler: &Compiler) -> Result<Matrix3<f64>, FileError> {
-    // What the element says itself comes before what its class says in another way.
+    // An orientation of the element itself precedes one of its class in another notation.
     let own: Vec<&str> = WAYS.into_iter().filter(|way| of.element.attribute(way).is_some()).collect();
     if let [first, second, ..] = own.as_slice() {
         return Err(of.element.error(format!("says both {first} and {second}; expected one way to say how it is turned")));

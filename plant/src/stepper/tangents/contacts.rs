@@ -168,7 +168,7 @@ impl<const W: usize> Lanes<W> {
     fn rests(&mut self, plant: &Plant) -> Vec<Option<(f64, f64, Across<W>)>> {
         let (constraints, work) = (&plant.fixed.constraints, &plant.work);
         let count = plant.frictions.len();
-        // The forces as they were when nobody knew that it stops.
+        // The forces before it was known that it stops.
         self.solution.unknown.clear();
         for c in 0..count {
             let (force, bounds) = (work.first_force[c], work.first_bounds[c]);

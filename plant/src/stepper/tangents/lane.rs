@@ -25,7 +25,7 @@ pub(super) struct Lane {
     /// The step, in the parameter's unit.
     pub(super) step: f64,
     pub(super) linear: Vec<Change>,
-    /// Of each path element, whether the step leaves its law as it is.
+    /// For each path element, whether the step leaves its law unchanged.
     pub(super) shares: Vec<bool>,
 }
 

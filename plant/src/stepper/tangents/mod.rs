@@ -1,9 +1,10 @@
 //! Derivatives of a motion by parameters, carried along with the motion (forward mode).
 //!
-//! The plant moves under the model as it is. Beside it each parameter has a lane: the derivatives of all positions and velocities by it, which obey the
-//! linear equations of a substep with the sticking and sliding of the plant's own (a tangent linear model), and the memories of the elements as they are
-//! where the parameter is a small step further. A substep of a lane thus solves no law and searches no contact that sticks; it only differences each law
-//! once along the lane's own direction. Where dry friction comes to rest and goes on the other way, the moment of rest moves along, too.
+//! The plant moves under the unchanged model. Beside it each parameter has a lane: the derivatives of all positions and velocities with respect to it,
+//! and the memories of the elements for a parameter that is a small step larger. The derivatives obey the linear equations of a substep with the
+//! sticking and sliding of the plant's own (a tangent linear model). A substep of a lane thus solves no law and searches no contact that sticks; it only
+//! differences each law once along the lane's own direction. Where dry friction comes to rest and goes on the other way, the moment of rest moves along,
+//! too.
 
 mod contacts;
 mod lane;
@@ -35,8 +36,8 @@ enum Wide {
 impl Tangents {
     /// Follows `plant`, which was compiled from `model` for samples `period` seconds apart and has not moved yet. Each parameter is given by a model that
     /// differs from `model` in it alone, and by how much it differs: small enough for a straight line. `None` where a model differs in more than its bodies
-    /// and elements, where there are more than [`LANES`], for a linear model, whose exact solution has no substeps to follow, and for a robot, whose inertia
-    /// changes on the way.
+    /// and elements, or where there are more than [`LANES`]. Also for a linear model, whose exact solution has no substeps to follow, and for a robot, whose
+    /// inertia changes on the way.
     pub fn new(plant: &Plant, model: &Model, moved: &[(Model, f64)], period: f64) -> Option<Tangents> {
         let options = Options { substeps: Some(plant.substeps), ..Options::default() };
         let alike = |m: &Model| m.inputs == model.inputs && m.outputs == model.outputs && m.elements.len() == model.elements.len();

@@ -1,4 +1,4 @@
-//! One law, differenced once for all lanes that leave its numbers alone.
+//! One law, differenced once for all lanes that leave its parameters unchanged.
 
 use crate::elements::Law;
 use crate::stepper::path::PathElement;
