@@ -6,7 +6,7 @@ use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::parameters::rows;
 use backdrive_diagnosis::verdict::{Finding, HeldOut, Remaining};
 use backdrive_diagnosis::words;
-use backdrive_pages::diagnose::said::{alternatives, confidence, errors, next_experiment, parameters, shows};
+use backdrive_pages::diagnose::sentences::{alternatives, confidence, errors, next_experiment, parameters, shows};
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
 

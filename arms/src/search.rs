@@ -3,10 +3,10 @@
 use crate::consistent::consistent;
 use crate::error::ArmError;
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
-use crate::left::{Left, left};
 use crate::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
+use crate::remaining_residual::{Left, left};
 use backdrive_diagnosis::predictive::{Gain, gain};
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -28,8 +28,8 @@ pub struct Candidate {
     pub may_be_nothing: bool,
     /// Its residual on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<HeldOut>,
-    /// The same with its numbers let go as far as the fitted recordings leave open, see [`crate::let_go`]; `None` where nothing hangs on it.
-    pub let_go: Option<HeldOut>,
+    /// The same with its numbers let go as far as the fitted recordings leave open, see [`crate::released_parameters`]; `None` where nothing hangs on it.
+    pub released: Option<HeldOut>,
 }
 
 impl Candidate {
@@ -66,7 +66,7 @@ pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -
     let correlation_time = correlation_time(evaluator, &fit.residuals);
     let (levels, whiteness_statistic) = (levels(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals));
     let blocks = blocks(evaluator, &fit.residuals);
-    Candidate { structure, fit, correlation_time, whiteness_statistic, levels, blocks, may_be_nothing: false, unseen: None, let_go: None }
+    Candidate { structure, fit, correlation_time, whiteness_statistic, levels, blocks, may_be_nothing: false, unseen: None, released: None }
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.

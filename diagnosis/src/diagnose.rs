@@ -6,10 +6,10 @@ use crate::compare::unseen;
 use crate::contenders::with_contenders;
 use crate::equation_error::{OnForces, inverse, search_on_forces};
 use crate::hold;
-use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
+use crate::released_parameters::hold_with_released_parameters;
 use crate::search::{Search, SearchError, Settings, search};
 use crate::thinned::thinned;
 use crate::tuning::tuning;
@@ -150,7 +150,7 @@ fn by_simulation(
     let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, remarks)?;
     report("fitting what could stand in its place");
     let mut search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
-    let_go(&problem, &mut search, limit);
+    hold_with_released_parameters(&problem, &mut search, limit);
     without_what_may_be_nothing(&problem, &mut search);
     Ok((problem, search))
 }

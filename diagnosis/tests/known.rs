@@ -108,7 +108,7 @@ fn refitted_numbers_lie_in_their_intervals() {
         blocks: Vec::new(),
         may_be_nothing: false,
         unseen: None,
-        let_go: None,
+        released: None,
     };
     let spread = Uncertainty::measured(&evaluator, &candidate);
     for (path, true_value) in [("elements.belt.stiffness", 1100.0), ("elements.air.damping", 1.0), ("bodies.load", 0.4)] {

@@ -225,7 +225,7 @@ fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>) -> Verdict
     Verdict {
         schema: SCHEMA,
         word,
-        sentence: crate::said::sentence(word, &findings, &servo),
+        sentence: crate::sentences::sentence(word, &findings, &servo),
         findings,
         shows: None,
         parameters: BTreeMap::new(),

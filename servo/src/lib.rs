@@ -13,7 +13,7 @@ pub mod problem;
 pub mod record;
 pub mod refit;
 pub mod run;
-pub mod said;
 pub mod search;
+pub mod sentences;
 pub mod shared;
 pub mod simulate;

@@ -10,7 +10,7 @@ use crate::output;
 use crate::progress;
 use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, Tried, diagnose as diagnosed};
 use backdrive_arms::problem::Problem;
-use backdrive_arms::said::{unexplained, words};
+use backdrive_arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Verdict, Word};
 use backdrive_diagnosis::words as said;

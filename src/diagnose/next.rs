@@ -6,7 +6,7 @@ use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Word};
 use backdrive_nodes::graph::{NodeKind, Overrides, Settings};
-use backdrive_pages::diagnose::said::next_experiment;
+use backdrive_pages::diagnose::sentences::next_experiment;
 use backdrive_report::percent;
 use backdrive_stability::summary::graph_of;
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ use backdrive_plant::set::RecordingSet;
 use backdrive_report::number;
 use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
 use backdrive_servo::problem::{Problem, is_servo};
-use backdrive_servo::said::words;
+use backdrive_servo::sentences::words;
 use backdrive_sets::{checks, open};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! The answer: what happens, why, and what would stop it.
 
-use crate::as_it_was::as_it_was;
+use crate::as_recorded::as_recorded;
 use crate::cause::{Asked, Cause, causes, reproduces};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
@@ -145,7 +145,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
         closer(question, recorded, &mut answer, hear, cancel)?;
     }
-    let was = as_it_was(graph, &answer.differences);
+    let was = as_recorded(graph, &answer.differences);
     let named = Named::of(&was.graph, graph, answer.master.is_none());
     answer.remedies.iter_mut().for_each(|remedy| remedy.options = options(&remedy.changes, &named));
     of_events(&mut answer, recorded);
@@ -216,7 +216,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     }
     let steps = session.len().min(MOST_STEPS) as u64;
     let hand = Hand { intents: question.intents.clone(), steps, rate_hz: graph.timing.rate_hz };
-    let was: Trial = as_it_was(graph, &answer.differences);
+    let was: Trial = as_recorded(graph, &answer.differences);
     hear("the loop as it was");
     let run = was.run(&hand, *gain, &RunOptions { keep_dither: true, keep_signals: true, ..RunOptions::default() }, cancel)?;
     answer.again_signals = run.signals;

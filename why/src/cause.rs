@@ -4,7 +4,7 @@
 //! that it states, a grip that its canceller takes for another) was not seen to be wrong, but without it the loop would hold. For both the test is
 //! the same: a re-simulation of the recorded loop, and one more without that one thing.
 
-use crate::as_it_was::{as_it_was, is_modelled};
+use crate::as_recorded::{as_recorded, is_modelled};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::difference::Difference;
@@ -209,7 +209,7 @@ fn suspects(asked: &Asked) -> Vec<Suspect> {
         if !is_modelled(difference) && difference.kind != NodeKind::Master {
             continue;
         }
-        all.push(Suspect { kind, place, evidence, seen: true, without: as_it_was(asked.graph, &others), repairs });
+        all.push(Suspect { kind, place, evidence, seen: true, without: as_recorded(asked.graph, &others), repairs });
     }
     all.extend(of_the_graph(asked.graph, asked.was, asked.happening));
     all

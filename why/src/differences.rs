@@ -1,6 +1,6 @@
 //! Where the loop of a bag is not the loop of its graph: every node by itself on what it was given.
 
-use crate::as_it_was::as_it_was;
+use crate::as_recorded::as_recorded;
 use crate::device::diagnose_master;
 use crate::difference::{Difference, delay};
 use crate::numbers::wrong_number;
@@ -73,7 +73,7 @@ pub fn differences(
         let Difference { node, axis, compared, .. } = all.found[place].clone();
         // Ways that are late are part of what it was given.
         let ways: Vec<Difference> = all.found.iter().filter(|d| d.way.is_some()).cloned().collect();
-        let as_it_is = as_it_was(graph, &ways).graph;
+        let as_it_is = as_recorded(graph, &ways).graph;
         // A gain of a sensor and a firmer hand are alike where everything grows as one exponential: what leaves less of it is the one.
         let simple = !needs_diagnosis(&compared);
         let number =

@@ -4,7 +4,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod answer;
-pub mod as_it_was;
+pub mod as_recorded;
 pub mod cause;
 pub mod cause_kind;
 pub mod change;

@@ -4,8 +4,8 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, Given, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Scans,
-    Singles, Split, Step,
+    BesideTheBest, Exchanges, Finer, FromNominal, Laws, More, MorePairs, OneParameter, OtherPlaces, Pairs, Race, Relatives,
+    RestoredDefaults, Richer, Ripples, Scans, Singles, Split, Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -17,16 +17,16 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     let mut steps: Vec<&'static dyn Step> = vec![
         &Ripples,
         &Singles::NEXT,
-        &Plain,
-        &GivenBack,
+        &OneParameter,
+        &RestoredDefaults,
         &Split::ALONE,
         &Scans,
         &Laws,
         &Singles::NEXT,
-        &Plain,
-        &Given,
+        &OneParameter,
+        &FromNominal,
         &Relatives,
-        &Elsewhere,
+        &OtherPlaces,
         &Relatives,
     ];
     if is_quiet {
@@ -45,12 +45,12 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
         &MorePairs,
         &Laws,
         &Exchanges,
-        &Elsewhere,
+        &OtherPlaces,
     ]);
     for _ in 2..effects {
-        steps.extend([&More as &dyn Step, &Split::BESIDE, &Scans, &Anew, &Exchanges]);
+        steps.extend([&More as &dyn Step, &Split::BESIDE, &Scans, &BesideTheBest, &Exchanges]);
     }
-    steps.extend([&Elsewhere as &dyn Step, &Relatives]);
+    steps.extend([&OtherPlaces as &dyn Step, &Relatives]);
     steps
 }
 

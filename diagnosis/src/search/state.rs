@@ -30,7 +30,7 @@ pub(super) struct State<'s, 'a> {
     /// Single effects, what promises most first.
     pub singles: std::vec::IntoIter<Seed>,
     /// Laws that bring one number more than the nominal model has.
-    pub plain: std::vec::IntoIter<Seed>,
+    pub one_parameter: std::vec::IntoIter<Seed>,
     /// Effects at once.
     pub effects: usize,
     /// Substeps that blur less than the residual.
@@ -56,7 +56,7 @@ impl<'s, 'a> State<'s, 'a> {
         work: &'s Work<'s>,
     ) -> State<'s, 'a> {
         let none = || Vec::new().into_iter();
-        let (singles, plain) = (none(), none());
+        let (singles, one_parameter) = (none(), none());
         let (related, moved_about) = (String::new(), String::new());
         let mut all = State {
             course,
@@ -67,7 +67,7 @@ impl<'s, 'a> State<'s, 'a> {
             work,
             found: Vec::new(),
             singles,
-            plain,
+            one_parameter,
             effects: 1,
             fine: course.coarse,
             related,
@@ -76,7 +76,7 @@ impl<'s, 'a> State<'s, 'a> {
             journal: Vec::new(),
         };
         all.singles = all.promising().into_iter();
-        all.plain = all.of_one_number().into_iter();
+        all.one_parameter = all.of_one_number().into_iter();
         all
     }
 

@@ -123,7 +123,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
 
 /// What two candidates leave on the held-out recordings, with their numbers let go where both were.
 fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c HeldOut>, Option<&'c HeldOut>) {
-    match (&base.let_go, &better.let_go) {
+    match (&base.released, &better.released) {
         (Some(a), Some(b)) => (Some(a), Some(b)),
         _ => (base.unseen.as_ref(), better.unseen.as_ref()),
     }
@@ -136,7 +136,7 @@ pub(crate) fn decided_by_unseen(search: &Search, c: &Candidate, best: &Candidate
         && !c.structure.added.is_empty()
         && c.unseen.is_some()
         && advantage_over(c, best, search.samples) < alike
-        && (c.let_go.is_some() || unseen_evidence(search, c, best) > alike)
+        && (c.released.is_some() || unseen_evidence(search, c, best) > alike)
 }
 
 /// What the held-out recordings say alone; 0 where there are none.

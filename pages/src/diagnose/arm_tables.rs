@@ -1,11 +1,11 @@
 //! Tables of an arm: findings, joints, inertial parameters, what was tried, logs.
 
-use super::said::{confidence, parameters};
+use super::sentences::{confidence, parameters};
 use crate::parts::{file_name, sentence};
 use backdrive_arms::diagnose::Tried;
 use backdrive_arms::judge::AGAINST;
 use backdrive_arms::problem::Problem;
-use backdrive_arms::said::{unexplained, words};
+use backdrive_arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::{Interval, Verdict};
 use backdrive_diagnosis::words as said;

@@ -6,7 +6,7 @@ mod arm_tables;
 mod force;
 mod held_out;
 mod phrases;
-pub mod said;
+pub mod sentences;
 pub mod servo;
 mod tables;
 
@@ -18,7 +18,7 @@ use backdrive_diagnosis::verdict::{Verdict, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
 use phrases::{adds, tone};
-use said::{alternatives, confidence, errors, parameters, shows};
+use sentences::{alternatives, confidence, errors, parameters, shows};
 
 /// What a report shows.
 pub struct Shown<'a> {

@@ -9,8 +9,8 @@ use backdrive_diagnosis::words as said;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_servo::diagnose::{Answer, Found, Judged};
 use backdrive_servo::problem::Problem;
-use backdrive_servo::said::words;
 use backdrive_servo::search::scored;
+use backdrive_servo::sentences::words;
 
 /// Records that are drawn of each joint.
 const DRAWN: usize = 2;

@@ -3,7 +3,7 @@
 
 mod compare;
 mod page;
-mod told;
+mod reported;
 mod user_force;
 mod world;
 
@@ -12,7 +12,7 @@ use crate::table::Report;
 use crate::{Context, Study, StudyError};
 use backdrive_control::observer::{System, Weights, design, kalman};
 use backdrive_testbench::{Asked, Record, Validation, identify, validate};
-use told::Told;
+use reported::Reported;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -34,7 +34,7 @@ fn asked() -> Asked {
     }
 }
 
-fn bench(context: &Context, seed: u64) -> Result<Told, StudyError> {
+fn bench(context: &Context, seed: u64) -> Result<Reported, StudyError> {
     let out = context.out.join(format!("bench-{seed}"));
     let world = world::World::make(seed, &out)?;
     let record = |name: &str| -> Result<Record, StudyError> { Record::of_bag(&world.record(name)?).map_err(failed) };
@@ -46,7 +46,7 @@ fn bench(context: &Context, seed: u64) -> Result<Told, StudyError> {
     let observation = asked().observation;
     let tuned = compare::Tuning::best(&identified.bench, &observation, &steps, &world.engine.engine);
     let comparison = compare::compare(&identified.bench, &observation, &unseen, &world.other_day.engine, tuned).map_err(failed)?;
-    Ok(Told { seed, world, identified, steps, unseen, dragged, validation, comparison })
+    Ok(Reported { seed, world, identified, steps, unseen, dragged, validation, comparison })
 }
 
 fn run(context: &Context) -> Result<Report, StudyError> {
@@ -100,7 +100,7 @@ fn gains(report: &mut Report) -> Result<(), StudyError> {
 }
 
 /// What was identified beside what is true.
-fn numbers(report: &mut Report, told: &Told) {
+fn numbers(report: &mut Report, told: &Reported) {
     let (found, truth) = (&told.identified.bench.shaft, &told.world.shaft);
     let seed = told.seed;
     let mut line = |what: &str, found: f64, truth: f64, unit: &str, most: f64| {
@@ -133,7 +133,7 @@ fn numbers(report: &mut Report, told: &Told) {
 }
 
 /// The paper's correlations beside ours, over all benches.
-fn correlations(report: &mut Report, told: &[Told]) {
+fn correlations(report: &mut Report, told: &[Reported]) {
     let mut line = |what: &str, pick: &dyn Fn(&Validation) -> f64, paper: &str, place: &str, least: Option<f64>| {
         let values: Vec<f64> = told.iter().map(|t| 100.0 * pick(&t.validation)).collect();
         let text = values.iter().map(|v| format!("{v:.1}")).collect::<Vec<_>>().join(", ");

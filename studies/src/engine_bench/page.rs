@@ -1,6 +1,6 @@
 //! The page: the paper's figures where its text gives them, and ours.
 
-use super::told::Told;
+use super::reported::Reported;
 use super::user_force;
 use crate::table::Report;
 use crate::{Context, StudyError};
@@ -29,7 +29,7 @@ fn over_time(title: &str, axis: (&str, &str), time: &[f64], signals: [(&str, &[f
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write(context: &Context, report: &Report, told: &[Told], users: &[user_force::Told]) -> Result<(), StudyError> {
+pub fn write(context: &Context, report: &Report, told: &[Reported], users: &[user_force::Reported]) -> Result<(), StudyError> {
     let mut page = Page::new("Paper 003: model of a test bench for combustion engines, from bags");
     let missed = report.missed();
     let (tone, lead) = match missed {
@@ -79,7 +79,7 @@ pub fn write(context: &Context, report: &Report, told: &[Told], users: &[user_fo
     page.write(&path).map_err(|e| StudyError::Write(format!("{}: cannot be written: {e}", path.display())))
 }
 
-fn correlations(page: &mut Page, told: &[Told]) {
+fn correlations(page: &mut Page, told: &[Reported]) {
     let names = ["w_A closed loop", "T_C engine", "T_A shaken", "T_A cycle"];
     let places = [1.0, 2.0, 3.0, 4.0];
     let paper = Plot::new("Paper: Section III")
@@ -101,7 +101,7 @@ fn correlations(page: &mut Page, told: &[Told]) {
     );
 }
 
-fn mechanics(page: &mut Page, one: &Told) {
+fn mechanics(page: &mut Page, one: &Reported) {
     let (v, dragged, unseen) = (&one.validation, &one.dragged, &one.unseen);
     page.figure(
         over_time("Fig. 4: validation of the mechanical system", ("w_A", "rad/s"), &dragged.times(), [("simulated", &v.dragged.dyno_speed), ("measured", &dragged.dyno_speed)]),
@@ -116,7 +116,7 @@ fn mechanics(page: &mut Page, one: &Told) {
     }
 }
 
-fn engine(page: &mut Page, one: &Told) {
+fn engine(page: &mut Page, one: &Reported) {
     let percent = |pedals: &[f64]| pedals.iter().map(|p| 100.0 * p).collect::<Vec<f64>>();
     let map = &one.identified.bench.engine.map;
     let paper = Plot::new("Fig. 7, paper: static map")
@@ -182,7 +182,7 @@ fn engine(page: &mut Page, one: &Told) {
     });
 }
 
-fn whole(page: &mut Page, one: &Told) {
+fn whole(page: &mut Page, one: &Reported) {
     let (v, unseen) = (&one.validation, &one.unseen);
     page.figure(
         over_time(
@@ -204,7 +204,7 @@ fn whole(page: &mut Page, one: &Told) {
     );
 }
 
-fn observer(page: &mut Page, one: &Told) {
+fn observer(page: &mut Page, one: &Reported) {
     let comparison = &one.comparison;
     let from = (18.0 / one.unseen.period_s) as usize;
     let to = (from + (8.0 / one.unseen.period_s) as usize).min(comparison.truth.len());

@@ -9,7 +9,7 @@ use backdrive_signal::statistics::{correlation, rms};
 use std::path::Path;
 
 /// The observer's estimates of a master.
-pub struct Told {
+pub struct Reported {
     /// The master.
     pub name: &'static str,
     /// s.
@@ -28,7 +28,7 @@ pub struct Told {
 ///
 /// # Errors
 /// When a run fails.
-pub fn run(context: &Context) -> Result<Vec<Told>, StudyError> {
+pub fn run(context: &Context) -> Result<Vec<Reported>, StudyError> {
     let file = |path: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
     [
         ("linear master", "plant/models/impulse-engine-linear.toml"),
@@ -49,13 +49,13 @@ pub fn run(context: &Context) -> Result<Vec<Told>, StudyError> {
         let most = truth.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let error = rms(truth.iter().zip(&estimate).map(|(a, b)| a - b));
         let correlation = correlation(&truth, &estimate);
-        Ok(Told { name, time: found.t, truth, estimate, error: [error, error / most], correlation })
+        Ok(Reported { name, time: found.t, truth, estimate, error: [error, error / most], correlation })
     })
     .collect()
 }
 
 /// Its lines of the table.
-pub fn table(report: &mut Report, told: &[Told]) {
+pub fn table(report: &mut Report, told: &[Reported]) {
     for one in told {
         let text = format!(
             "{:.3} N rms, {:.1} % of the largest, correlation {:.1} %",

@@ -1,18 +1,18 @@
 //! The steps of a search: each says which structures it wants fitted, given what was found; a file each. Their order is the schedule's.
 
-mod anew;
-mod elsewhere;
+mod beside_the_best;
 mod exchanges;
 mod extensions;
 mod finer;
-mod given;
-mod given_back;
+mod from_nominal;
 mod laws;
 mod more;
 mod near;
+mod one_parameter;
+mod other_places;
 mod pairs;
-mod plain;
 mod relatives;
+mod restored_defaults;
 mod richer;
 mod ripples;
 mod scans;
@@ -20,17 +20,17 @@ mod singles;
 mod split;
 mod step;
 
-pub(super) use anew::Anew;
-pub(super) use elsewhere::Elsewhere;
+pub(super) use beside_the_best::BesideTheBest;
 pub(super) use exchanges::Exchanges;
 pub(super) use finer::Finer;
-pub(super) use given::Given;
-pub(super) use given_back::GivenBack;
+pub(super) use from_nominal::FromNominal;
 pub(super) use laws::Laws;
 pub(super) use more::More;
+pub(super) use one_parameter::OneParameter;
+pub(super) use other_places::OtherPlaces;
 pub(super) use pairs::{MorePairs, Pairs};
-pub(super) use plain::Plain;
 pub(super) use relatives::Relatives;
+pub(super) use restored_defaults::RestoredDefaults;
 pub(super) use richer::Richer;
 pub(super) use ripples::Ripples;
 pub(super) use scans::Scans;

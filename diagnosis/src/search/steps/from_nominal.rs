@@ -10,9 +10,9 @@ use crate::tuning::tuning;
 
 /// The refit of a model that lacks something leads away from stated parameters that were right, and an effect found beside those may end in another valley, or have a
 /// richer law in its place. So the nearest are also fitted from the parameters as given.
-pub(crate) struct Given;
+pub(crate) struct FromNominal;
 
-impl Step for Given {
+impl Step for FromNominal {
     fn name(&self) -> &'static str {
         "fitting beside the parameters as given"
     }

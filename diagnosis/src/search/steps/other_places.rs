@@ -10,9 +10,9 @@ use crate::search::state::State;
 use crate::tuning::tuning;
 
 /// The place where a law was found at first may be a neighbour of its own.
-pub(crate) struct Elsewhere;
+pub(crate) struct OtherPlaces;
 
-impl Step for Elsewhere {
+impl Step for OtherPlaces {
     fn name(&self) -> &'static str {
         "fitting the same law at other places"
     }

@@ -17,7 +17,7 @@ use crate::work::{Budget, Limit, Steps};
 use rayon::prelude::*;
 
 /// Lets the numbers go of what is chosen, and of structures of as many effects that the unseen recordings alone tell from it. Then of what is chosen for that.
-pub fn let_go(problem: &Problem, search: &mut Search, limit: Limit) {
+pub fn hold_with_released_parameters(problem: &Problem, search: &mut Search, limit: Limit) {
     for _ in 0..tuning().search.finalists {
         let best = chosen(search);
         let with: Vec<bool> = search.found.iter().map(|c| std::ptr::eq(c, best) || decided_by_unseen(search, c, best)).collect();
@@ -26,11 +26,11 @@ pub fn let_go(problem: &Problem, search: &mut Search, limit: Limit) {
         }
         let noise_sd = search.noise_sd.clone();
         let mut open: Vec<&mut Candidate> =
-            search.found.iter_mut().zip(with).filter(|(c, with)| *with && c.let_go.is_none()).map(|(c, _)| c).collect();
+            search.found.iter_mut().zip(with).filter(|(c, with)| *with && c.released.is_none()).map(|(c, _)| c).collect();
         if open.is_empty() {
             return;
         }
-        open.par_iter_mut().for_each(|c| c.let_go = of(problem, c, &noise_sd, limit).or_else(|| c.unseen.clone()));
+        open.par_iter_mut().for_each(|c| c.released = of(problem, c, &noise_sd, limit).or_else(|| c.unseen.clone()));
     }
 }
 
@@ -92,7 +92,7 @@ mod tests {
         let mut found = candidate(&evaluator, structure, fitted);
         found.unseen = unseen(&problem, &problem.held_out, &found.structure, &found.fit.values, &problem.noise_sd);
         let raw = found.unseen.as_ref().unwrap().mean_square;
-        let let_go = of(&problem, &found, &problem.noise_sd, Limit::default()).unwrap().mean_square;
-        assert!(raw > 1.5 && let_go < 1.2, "{raw} {let_go}");
+        let released = of(&problem, &found, &problem.noise_sd, Limit::default()).unwrap().mean_square;
+        assert!(raw > 1.5 && released < 1.2, "{raw} {released}");
     }
 }

@@ -7,7 +7,7 @@ use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};
 use backdrive_stability::by_itself::compared::AsIf;
 
 /// Puts differences into a graph; those of which nothing simple is known stay out, and are not counted.
-pub fn as_it_was(graph: &Graph, differences: &[Difference]) -> Trial {
+pub fn as_recorded(graph: &Graph, differences: &[Difference]) -> Trial {
     let mut trial = Trial::of(graph.clone());
     for difference in differences {
         put(&mut trial, difference);

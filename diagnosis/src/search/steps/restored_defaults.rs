@@ -9,9 +9,9 @@ use crate::tuning::tuning;
 use std::collections::HashSet;
 
 /// A law beside a stated parameter of its kind in the neighbourhood, which starts where that has given back what it may have absorbed.
-pub(crate) struct GivenBack;
+pub(crate) struct RestoredDefaults;
 
-impl Step for GivenBack {
+impl Step for RestoredDefaults {
     fn name(&self) -> &'static str {
         "splitting parameters with a neighbour"
     }

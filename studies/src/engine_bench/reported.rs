@@ -5,7 +5,7 @@ use super::world::World;
 use backdrive_testbench::{Identified, Record, Validation};
 
 /// A bench from its seed to its figures.
-pub(super) struct Told {
+pub(super) struct Reported {
     pub(super) seed: u64,
     pub(super) world: World,
     pub(super) identified: Identified,

@@ -12,9 +12,9 @@ use crate::work::Steps;
 use std::collections::HashSet;
 
 /// What only shows beside a law that was found shows little coupled to the motion of the nominal model.
-pub(crate) struct Anew;
+pub(crate) struct BesideTheBest;
 
-impl Step for Anew {
+impl Step for BesideTheBest {
     fn name(&self) -> &'static str {
         "screening beside the best"
     }

@@ -5,9 +5,9 @@ use crate::race::Seed;
 use crate::search::state::State;
 
 /// Laws of one parameter: to first order they may do no more than the nominal parameters do together.
-pub(crate) struct Plain;
+pub(crate) struct OneParameter;
 
-impl Step for Plain {
+impl Step for OneParameter {
     fn name(&self) -> &'static str {
         "fitting laws of one parameter"
     }
@@ -19,6 +19,6 @@ impl Step for Plain {
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
-        state.plain.by_ref().collect()
+        state.one_parameter.by_ref().collect()
     }
 }
