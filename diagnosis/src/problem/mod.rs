@@ -21,7 +21,7 @@ use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
 use crate::unknown::Unknown;
-use backdrive_plant::model::Model;
+use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::set::{Initial, RecordingSet};
 use backdrive_plant::stepper::{Options, Plant, ahead};
 use backdrive_plant::tomlfile::read_text;
@@ -66,6 +66,21 @@ impl Problem {
     pub fn is_unmeasured(&self, place: &Place) -> bool {
         let names = self.unknown.iter().filter_map(|unknown| self.model.inputs.get(unknown.input)).map(|input| &input.name);
         matches!(place, Place::Signal(signal) if names.into_iter().any(|name| name == signal))
+    }
+
+    /// Bodies that a measured motion of zero holds still in all recordings: a law between such a body and another does what it does between that one and the
+    /// ground.
+    pub fn standing_bodies(&self) -> Vec<&str> {
+        let is_unknown = |input: usize| self.unknown.iter().any(|unknown| unknown.input == input);
+        let is_still =
+            |input: usize| self.fit.iter().chain(&self.held_out).all(|r| r.inputs.get(input).is_some_and(|v| v.iter().all(|x| *x == 0.0)));
+        let driven = self
+            .model
+            .inputs
+            .iter()
+            .enumerate()
+            .filter(|(index, input)| input.kind == InputKind::Motion && !is_unknown(*index) && is_still(*index));
+        driven.filter_map(|(_, input)| Some(self.model.bodies.get(input.on)?.name.as_str())).collect()
     }
 
     /// Opens a set whose `set.toml` names the model, or which is held against `model`.

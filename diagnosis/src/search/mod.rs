@@ -17,7 +17,7 @@ use crate::error_budget::error_budget;
 use crate::evaluator::Evaluator;
 use crate::excerpts::Excerpts;
 use crate::hold::told;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, Place};
 use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
@@ -121,7 +121,24 @@ fn hypotheses_for(nominal: &Nominal, settings: &Settings) -> Vec<Hypothesis> {
         let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));
         !is_number && !problem.is_unmeasured(&h.place) && classes.insert(h.class.clone())
     });
-    hypotheses
+    without_repeats_at(&problem.standing_bodies(), hypotheses)
+}
+
+/// Hypotheses without those between a body that stands still and another, where the same law stands between that one and the ground: no recording separates them.
+fn without_repeats_at(standing: &[&str], hypotheses: Vec<Hypothesis>) -> Vec<Hypothesis> {
+    let grounded = |place: &Place| match place {
+        Place::Between(a, b) if standing.contains(&a.as_str()) && b != "ground" => Some(Place::Between(b.clone(), "ground".to_string())),
+        Place::Between(a, b) if standing.contains(&b.as_str()) && a != "ground" => Some(Place::Between(a.clone(), "ground".to_string())),
+        Place::Between(..) | Place::Signal(_) => None,
+    };
+    let is_repeat = |h: &Hypothesis| {
+        let other = grounded(&h.place).filter(|_| h.replaces.is_empty());
+        other.is_some_and(|place| {
+            hypotheses.iter().any(|o| o.physics == h.physics && o.place.same(&place) && o.parameters.len() == h.parameters.len())
+        })
+    };
+    let keeps: Vec<bool> = hypotheses.iter().map(|h| !is_repeat(h)).collect();
+    hypotheses.into_iter().zip(keeps).filter_map(|(h, keep)| keep.then_some(h)).collect()
 }
 
 /// What screening promised of each, the most first.

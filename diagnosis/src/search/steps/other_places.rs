@@ -4,10 +4,11 @@ use super::near::brought_near;
 use super::step::{Step, Terms};
 use crate::candidate::{Candidate, key_of, simplest};
 use crate::evaluator::Evaluator;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Family, Hypothesis, Parameter, Place};
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 use crate::tuning::tuning;
+use backdrive_plant::model::Model;
 
 /// The place where a law was found at first may be a neighbour of its own.
 pub(crate) struct OtherPlaces;
@@ -33,7 +34,10 @@ impl Step for OtherPlaces {
         state.moved_about = law(state);
         let course = state.course;
         let Some(best) = simplest(&state.found, state.samples()) else { return Vec::new() };
-        let seeds = elsewhere(&course, best);
+        let mut seeds = elsewhere(&course, best);
+        if !state.is_done() {
+            seeds.extend(shared(&course, best));
+        }
         // What stands in another place asks for other parameters all around: some steps with patience, before it is held against one that is at its end. And where
         // the stated parameters were right, the refit without the effect has led away from them: so from there, too, in its own place as well.
         let problem = course.evaluator.problem;
@@ -76,4 +80,59 @@ fn elsewhere(course: &Course, best: &Candidate) -> Vec<Seed> {
         }
     }
     seeds
+}
+
+/// Friction of one body shared with a body that an element joins to it, half of the force at each: below their resonance both together do what one does, so that
+/// friction of two bodies is found as that of one at first.
+fn shared(course: &Course, best: &Candidate) -> Vec<Seed> {
+    let problem = course.evaluator.problem;
+    let own = course.effects_of(&best.structure, &best.fit.values);
+    let mut seeds = Vec::new();
+    for (slot, effect) in best.structure.added.iter().enumerate() {
+        let Some(body) = grounded(&effect.place).filter(|_| effect.physics.family == Family::Friction) else { continue };
+        let neighbours = neighbours(&problem.model, body);
+        let is_beside = |h: &Hypothesis| {
+            h.physics == effect.physics
+                && h.parameters.len() == effect.parameters.len()
+                && grounded(&h.place).is_some_and(|other| neighbours.contains(&other))
+                && best.structure.added.iter().all(|other| other.compatible(h))
+        };
+        for (index, h) in course.hypotheses.iter().enumerate().filter(|(_, h)| is_beside(h)) {
+            let mut effects = own.clone();
+            let Some((_, values)) = effects.get_mut(slot) else { continue };
+            let force = |p: &Parameter| matches!(p.unit.as_str(), "N" | "N m");
+            effect.parameters.iter().zip(values.iter_mut()).filter(|(p, _)| force(p)).for_each(|(p, v)| *v = (0.5 * *v).max(p.range.0));
+            let half = h.parameters.iter().zip(values.iter()).map(|(p, v)| v.clamp(p.range.0, p.range.1)).collect();
+            effects.push((index, half));
+            seeds.push(Seed::beside(problem, (&best.structure, &best.fit.values), effects, false));
+        }
+    }
+    seeds
+}
+
+/// The body of a law between it and the ground.
+fn grounded(place: &Place) -> Option<&str> {
+    match place {
+        Place::Between(body, ground) | Place::Between(ground, body) if ground == "ground" => Some(body),
+        Place::Between(..) | Place::Signal(_) => None,
+    }
+}
+
+/// Bodies that an element joins to this one.
+fn neighbours<'m>(model: &'m Model, body: &str) -> Vec<&'m str> {
+    let name = |index: Option<usize>| index.and_then(|i| model.bodies.get(i)).map(|b| b.name.as_str());
+    let other = |between: [Option<usize>; 2]| {
+        let [a, b] = between.map(name);
+        if a == Some(body) {
+            b
+        } else if b == Some(body) {
+            a
+        } else {
+            None
+        }
+    };
+    let mut all: Vec<&str> = model.elements.iter().filter_map(|e| other(e.between)).filter(|name| *name != body).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
