@@ -1,4 +1,4 @@
-//! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
+//! A structure, fitted, and the measures of its quality: the data that fitting, proposals, schedule and verdict use.
 
 use crate::compare::{HeldOut, blocks};
 use crate::evaluator::Evaluator;
@@ -28,7 +28,8 @@ pub struct Candidate {
     pub may_be_nothing: bool,
     /// Its residual on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<HeldOut>,
-    /// The same with its numbers let go as far as the fitted recordings leave open, see [`crate::released_parameters`]; `None` where nothing hangs on it.
+    /// The same with its parameters released as far as the fitted recordings leave them open, see [`crate::released_parameters`]; `None` where no decision
+    /// depends on it.
     pub released: Option<HeldOut>,
 }
 

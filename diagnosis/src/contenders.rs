@@ -16,7 +16,7 @@ use crate::tuning::tuning;
 use crate::verdict::chosen;
 use crate::work::Budget;
 
-/// The search with fits of what could stand in the place of each effect that would be claimed, as far as the budget goes. `without`: physics that is withheld.
+/// The search, with fits of possible alternatives to each effect that would be claimed, as far as the budget allows. `without`: effects that are withheld.
 pub fn with_contenders<'a>(problem: &'a Problem, search: Search, without: &[String], budget: &Budget<'a>) -> Search {
     let more = contenders(problem, &search, without, budget);
     let mut search = search;
@@ -58,7 +58,7 @@ fn brought_on<'a>(problem: &'a Problem, search: &Search, budget: &Budget<'a>) ->
     budget.abreast(&open, on).into_iter().flatten().flatten().collect()
 }
 
-/// What is to be fitted in the place of one effect.
+/// What is fitted instead of one effect.
 struct Seed<'h> {
     slot: usize,
     hypothesis: &'h Hypothesis,

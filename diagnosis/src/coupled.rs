@@ -1,5 +1,5 @@
-//! The first part of a race, coupled to the measured motion: simulations are short there, fits go far in a step, and the residual tells laws
-//! apart that a free simulation does not show until all else is right.
+//! The first part of a race, coupled to the measured motion. Simulations are short there and one step of a fit goes far. The residual separates laws that a
+//! free simulation does not separate until everything else is right.
 
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;

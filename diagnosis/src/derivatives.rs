@@ -88,8 +88,8 @@ impl Evaluator<'_> {
         found.into_iter().flatten().collect()
     }
 
-    /// Derivatives that are carried along with the motion, in no more substeps than a direction of descent asks for; `None` by parameters that belong to an
-    /// input, an output or a single record, by all where the model is linear, and where it cannot be simulated.
+    /// Derivatives that are integrated along with the motion, in no more substeps than a descent direction needs. `None` for parameters that belong to an
+    /// input, an output or a single record. `None` for all parameters where the model is linear, and where it cannot be simulated.
     fn carried(&self, structure: &Structure, own: &[f64], residuals: usize, which: &[usize]) -> Vec<Option<Vec<f64>>> {
         let mut found = vec![None; which.len()];
         let values = to_external(structure, own);

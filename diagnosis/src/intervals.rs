@@ -47,8 +47,9 @@ impl Uncertainty {
         Uncertainty { deviation, bias: vec![0.0; n], correlation }
     }
 
-    /// The same, measured where the fit ended: derivatives from both sides, the scatter of the scores over blocks of the recordings
-    /// (residuals are correlated, and their variance differs from place to place: Huber's sandwich estimate by blocks), and what finer steps of the simulation would change.
+    /// The same, measured where the fit ended, from three sources. Derivatives are taken from both sides. The scatter of the scores is taken over blocks of
+    /// the recordings, because residuals are correlated and their variance differs from place to place: Huber's sandwich estimate by blocks. The third is
+    /// the change caused by finer steps of the simulation.
     pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Uncertainty {
         let mut spread = Uncertainty::of(candidate);
         let structure = &candidate.structure;
@@ -105,8 +106,8 @@ impl Uncertainty {
         spread
     }
 
-    /// Whether some of these parameters lie elsewhere than the fit has them by more than chance: `others` are places among the fit's parameters, and values as
-    /// they stand in the model. All together, for parameters that go together may each lie in its own interval.
+    /// Whether some of these parameters differ from their fitted values by more than chance. `others` are places among the fit's parameters, and their
+    /// values in the units of the model. All are tested jointly, because each of several correlated parameters may lie in its own interval.
     pub fn is_far(&self, candidate: &Candidate, others: &[(usize, f64)]) -> bool {
         let away = |(number, other): &(usize, f64)| {
             let (n, value) = (candidate.structure.free.get(*number)?, candidate.fit.values.get(*number)?);

@@ -17,7 +17,7 @@ pub struct Row {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// What the file says; `None` for what it does not state.
+    /// The value in the file; `None` where the file has none.
     pub given: Option<f64>,
     /// As fitted.
     pub value: f64,
@@ -29,7 +29,7 @@ pub struct Row {
     pub moved_sd: Option<f64>,
     /// Whether the recordings say more of it than what was assumed before.
     pub determined: bool,
-    /// Whether it ended at the edge of what a fit may try.
+    /// Whether it ended at a bound of the range that a fit may try.
     pub at_bound: bool,
 }
 

@@ -19,7 +19,7 @@ pub struct Own {
     pub value: f64,
     /// 95 % interval.
     pub ci95: [f64; 2],
-    /// Whether this record says something of it by itself.
+    /// Whether this record by itself carries information on it.
     pub determined: bool,
 }
 

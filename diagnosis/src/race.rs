@@ -213,8 +213,8 @@ impl Course<'_> {
     }
 }
 
-/// A start whose curves of unknown inputs are fitted beside the rest of it, with derivatives that another fit knows: a law begins beside a hand that
-/// goes with it, and not with what was found without it.
+/// A start whose curves of unknown inputs are fitted to the rest of it, with derivatives that another fit knows. A law then begins with a hand that is
+/// consistent with it, not with the hand that was found without it.
 pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>, structure: &Structure, start: Vec<f64>) -> Vec<f64> {
     if evaluator.problem.unknown.is_empty() {
         return start;

@@ -30,7 +30,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// The same in the place of another record, where it belongs to one.
+    /// The same for another record, where it belongs to one.
     pub fn in_record(&self, record: usize) -> Role {
         match self {
             Role::Condition(path, _) => Role::Condition(path.clone(), record),
@@ -212,8 +212,8 @@ impl Structure {
         Structure { added, free }
     }
 
-    /// Values to start from, as they stand in the model: the stated parameters as given, for each hypothesis the values given, and what belongs to
-    /// single records, such as the curve of a hand that nobody measured, as another fit found it.
+    /// Values to start from, in the units of the model: the stated parameters as given, and for each hypothesis the values given. What belongs to single
+    /// records, such as the curve of a hand that nobody measured, is taken from another fit.
     pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>], of_records: &[(Role, f64)]) -> Vec<f64> {
         let own = |role: &Role| of_records.iter().find(|(other, _)| other == role).map(|(_, value)| *value);
         let value = |number: &FreeParameter| match &number.role {

@@ -121,7 +121,7 @@ fn refitted_numbers_lie_in_their_intervals() {
     }
 }
 
-/// What a search says of a problem.
+/// Verdict and files of a search on a problem.
 fn said(problem: &Problem, settings: &Settings) -> (Verdict, Files) {
     let found = search(problem, settings, Limit::default(), &|_| {}).unwrap();
     verdict(problem, &found, &[], None, Limit::default()).unwrap()
@@ -252,7 +252,7 @@ of = "slide"
 
 const RIPPLE: &str = "\n[[elements]]\nname = \"teeth\"\nkind = \"cogging\"\nbetween = [\"slide\", \"ground\"]\namplitude = 0.8\nperiod = 4e-3\nphase = 0.5\n";
 
-/// The slide with teeth, moved to and fro; in the two recordings that no fit has seen its encoder counts from another place.
+/// The slide with teeth, moved to and fro; in the two held-out recordings its encoder counts from another zero.
 fn switched_on_again(condition: Option<Condition>) -> Problem {
     let truth = Model::from_toml(&format!("{SLIDE}{RIPPLE}"), "truth").unwrap();
     let nominal = Model::from_toml(SLIDE, "nominal").unwrap();

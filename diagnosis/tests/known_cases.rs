@@ -1,4 +1,5 @@
-//! Small inputs that were once answered wrongly, kept beside the project: each has to come out as its `expect.md` says. Without them there is nothing to test.
+//! Small inputs that were once answered wrongly, kept beside the project: each must give the result in its `expect.md`. Without them there is nothing to
+//! test.
 
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;

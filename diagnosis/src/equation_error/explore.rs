@@ -100,7 +100,7 @@ fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
-/// What is as small as rounding says nothing.
+/// Values of this size are within rounding errors and carry no information.
 const SMALLEST: f64 = 1e-12;
 
 /// The same with its errors and numbers, from what it leaves.

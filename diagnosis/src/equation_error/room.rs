@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// A law, or a few that go together, with each choice of nonlinear numbers.
+/// A law, or a few that act in combination, with each choice of nonlinear parameters.
 pub(crate) struct Law {
     /// Which of the hypotheses.
     pub hypotheses: Vec<usize>,

@@ -11,12 +11,12 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use backdrive_signal::statistics::rms;
 
-/// The excitation that determines parameters of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::free`], `told` the standard deviation that is told of each number, in the fit's own unit. It is wider than
-/// that of the sensors' noise alone where residuals are correlated or models differ; an experiment is taken to lessen it as much as that. What exceeds the budget is not tried.
+/// The excitation that determines parameters of a structure which the recordings do not determine. `numbers` are places among [`Structure::free`], `told`
+/// the reported standard deviation of each parameter, in the fit's own unit. It is wider than that of the sensors' noise alone where residuals are
+/// correlated or models differ; an experiment is assumed to reduce it by the same factor. What exceeds the budget is not tried.
 ///
 /// # Errors
-/// Says why when no excitation would determine them.
+/// States why when no excitation would determine them.
 pub fn excite<'a>(
     problem: &'a Problem,
     structure: &Structure,

@@ -88,8 +88,8 @@ impl<'a> Rival<'a> {
         self.structure.free.par_iter().enumerate().map(column).collect()
     }
 
-    /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances: with the Jacobian J
-    /// of the experiment and the information M of the recordings, the minimum over s of |d - J s|² + s' M s.
+    /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances. With the Jacobian J
+    /// of the experiment and the information M of the recordings it is the minimum over s of |d - J s|² + s' M s.
     pub(super) fn unexplained(&self, jacobian: &[Vec<f64>], difference: &[f64]) -> f64 {
         let whole = dot(difference, difference);
         let (mut matrix, right) = normal_equations(jacobian, difference, None);
@@ -102,8 +102,8 @@ impl<'a> Rival<'a> {
         scaled.cholesky().map_or(0.0, |c| (whole - short.dot(&c.solve(&short))).clamp(0.0, whole))
     }
 
-    /// The same of the difference from what another predicts, `target`, after as many Gauss-Newton steps as lower it: where a law has a threshold or an end, the first says
-    /// little. `pick` takes the outputs that count.
+    /// The same for the difference from another structure's prediction, `target`, after all Gauss-Newton steps that lower the cost. Where a law has a
+    /// threshold or an end, the first step alone is not informative. `pick` takes the outputs that count.
     pub(super) fn unexplained_after_steps(
         &self,
         setup: &Setup,

@@ -13,7 +13,7 @@ pub struct Experiment {
     pub text: String,
     /// The excitation on one line, as command lines and graphs have it.
     pub excitation: String,
-    /// What it tells apart, or the parameters that it determines.
+    /// The structures that it separates, or the parameters that it determines.
     pub between: Vec<String>,
     /// Standard deviations between the two of them that it separates least, each refitted to it.
     pub separation: f64,
@@ -44,7 +44,7 @@ pub struct NewSensor {
     pub noise_sd: f64,
 }
 
-/// Why there is no experiment, in one sentence that says what would help.
+/// Why there is no experiment, in one sentence that names a way to improve.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Reason(pub String);

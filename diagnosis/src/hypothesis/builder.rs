@@ -315,13 +315,13 @@ pub(crate) fn hung(
 }
 
 impl Hypothesis {
-    /// Says which number of the model does the same.
+    /// Sets the parameter of the model that has the same effect.
     pub(crate) fn same_as(mut self, path: Option<String>) -> Hypothesis {
         self.same_as = path;
         self
     }
 
-    /// Says that its parameters shift a signal in time.
+    /// Marks its parameters as shifts of a signal in time.
     pub(crate) fn in_samples(mut self) -> Hypothesis {
         self.parameters.iter_mut().for_each(|p| p.in_samples = true);
         self

@@ -18,8 +18,9 @@ pub(crate) struct Condensed {
 }
 
 impl Hypothesis {
-    /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path; `absorbed` says whether
-    /// that is a fitted one, which gives back what it absorbed, or one that knows nothing of the body.
+    /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path.
+    /// `absorbed` states whether that value is a fitted one, which is restored to what it was before it absorbed the body, or one that knows nothing of the
+    /// body.
     pub(crate) fn condensed(&self, model: &Model, stated: &dyn Fn(&str) -> Option<f64>, absorbed: bool) -> Vec<Condensed> {
         let Form::Series { joint, .. } = &self.form else { return Vec::new() };
         let ends = joint.each_ref().map(|name| model.bodies.iter().position(|b| b.name == *name));

@@ -41,7 +41,7 @@ pub enum Form {
     /// As a polynomial of third order; over velocity with one of second order for each direction that differ only in their even terms' sign:
     /// `c0 + c1 sign(v) + c2 v + c3 v |v|`.
     Smooth,
-    /// As its mean in each bin says.
+    /// By its mean in each bin.
     Binned,
 }
 

@@ -205,7 +205,7 @@ impl Bins {
     }
 }
 
-/// Bins of a curve; even, so that one edge is at zero.
+/// Bins of a curve; even, so that one boundary is at zero.
 const BINS: usize = 32;
 /// How much finer bins are about zero.
 const BOW: f64 = 3.0;

@@ -145,8 +145,8 @@ impl Problem {
         Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown, left_out, noise_sd, inverse: None, lag })
     }
 
-    /// The same without the outputs that stand at one value throughout while another moves: a sensor that is dead or at its rail says nothing of the device, and
-    /// has no noise to hold a residual against. The names of what was left out.
+    /// The same without the outputs that stand at one value throughout while another moves. A sensor that is dead or at its rail carries no information on
+    /// the device, and has no noise to normalise a residual. Also the names of the omitted outputs.
     pub fn without_dead_outputs(self) -> (Problem, Vec<String>) {
         let is_still = |output: usize| {
             // The same value in all of them: a device may also stand still in each recording, elsewhere in the next.
@@ -190,7 +190,7 @@ impl Problem {
 /// What a problem that was turned round is of.
 #[derive(Debug, Clone)]
 pub struct Inverse {
-    /// The problem as it was recorded.
+    /// The problem before it was inverted.
     pub recorded: Arc<Problem>,
     /// The output that is now the motion.
     pub motion: String,

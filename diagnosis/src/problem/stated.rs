@@ -11,7 +11,7 @@ pub struct Stated {
     pub path: String,
     /// Its place where the path leads to a list.
     pub index: usize,
-    /// What the file says.
+    /// The value in the file.
     pub given: f64,
     /// Lowest and highest value that a fit may try.
     pub range: (f64, f64),

@@ -15,8 +15,8 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
 
-/// An effect may only have helped the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
-/// parameters has to win over those that it contains. One such step may open the next.
+/// An effect may only have helped the other parameters out of a local minimum. So each effect of the best structure is removed again, and the others are
+/// refitted from their present values. A law of many parameters must also be better than the laws that it contains. One such step may open the next.
 pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &Work) {
     let samples = course.nominal.fit.residuals.len();
     let last = course.evaluator.within(work.up_to(tuning().search.best_end));
@@ -67,8 +67,9 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     sort(found, samples);
 }
 
-/// An effect that may be nothing may only have led the parameters around a bend: from the best, each such effect is taken back in steps while all else is
-/// fitted along (continuation), and where the rest may start from then. A fit from elsewhere does not get there through a curved valley.
+/// An effect that may be nothing may only have guided the parameters around a curved valley of the cost. So, from the best, each such effect is driven to
+/// zero in steps while all other parameters are refitted (continuation). Gives the starts for the remaining parameters. A fit from another start does not
+/// get there through a curved valley.
 pub(super) fn taken_back(evaluator: &Evaluator, found: &mut [Candidate], work: &Work) -> Vec<(Structure, Vec<f64>)> {
     let problem = evaluator.problem;
     let Some(best) = found.first_mut() else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! Which of the structures is claimed, and which cannot be told from it.
+//! Which of the structures is claimed, and which cannot be distinguished from it.
 
 use super::plausible::{is_at_bound, is_plausible};
 use crate::candidate::{Candidate, advantage_over, key_of};
@@ -34,8 +34,9 @@ pub fn chosen(search: &Search) -> &Candidate {
     best
 }
 
-/// Whether a law of fewer parameters is enough where one that contains it, at the same place, fits better: that one has to predict better by more than its
-/// own variation, and to remove a good part of what the simpler one leaves beyond the noise. On a real device one more number always helps a little.
+/// Whether a law of fewer parameters is enough where one that contains it, at the same place, fits better. The richer law must predict better by more than
+/// its own variation. It must also remove a good part of what the simpler one leaves beyond the noise. On a real device one more parameter always helps a
+/// little.
 fn is_enough(search: &Search, simple: &Candidate, rich: &Candidate) -> bool {
     if simple.structure.free.len() >= rich.structure.free.len() || !is_contained(simple, rich) {
         return false;
@@ -64,7 +65,7 @@ fn mean_square(search: &Search, c: &Candidate) -> f64 {
     (c.fit.cost + unseen) / (search.samples + unseen_samples).max(1) as f64
 }
 
-/// The same, with its numbers let go where those of the other were, too.
+/// The same, with its parameters released where those of the other were, too.
 fn mean_square_let_go(search: &Search, c: &Candidate, beside: &Candidate) -> f64 {
     let (Some(own), Some(_)) = on_unseen(c, beside) else { return mean_square(search, c) };
     (c.fit.cost + own.mean_square * search.unseen_samples as f64) / (search.samples + search.unseen_samples).max(1) as f64
@@ -81,9 +82,9 @@ pub(super) fn everywhere(base: &Candidate, better: &Candidate) -> Option<Gain> {
     }
 }
 
-/// Whether an effect predicts recordings that no fit has seen better: by more than that varies from block to block, and by enough to be of use. Where the
-/// nominal model predicts them down to the noise already they cannot say, and the fitted ones do; and where there are none. What errors of the
-/// integration and of the clock come to is no improvement.
+/// Whether an effect predicts held-out data better: by more than the gain varies from block to block, and by enough to be of use. Where the nominal model
+/// already predicts them down to the noise, or where there are none, the fitted recordings decide. An improvement within the errors of the integration and
+/// of the clock does not count.
 fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     let no_physics = beside_noise(&search.errors);
     let of_use = |a: f64, b: f64| a.sqrt() - b.sqrt() > tuning().claim.useful * b.sqrt().max(1.0) && a - b > no_physics;
@@ -121,7 +122,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
     if apart.abs() < least { evidence.clamp(-0.5 * tuning().claim.alike, 0.5 * tuning().claim.alike) } else { evidence }
 }
 
-/// What two candidates leave on the held-out recordings, with their numbers let go where both were.
+/// Residuals of two candidates on the held-out recordings, with released parameters where both have them.
 fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c HeldOut>, Option<&'c HeldOut>) {
     match (&base.released, &better.released) {
         (Some(a), Some(b)) => (Some(a), Some(b)),
@@ -129,7 +130,7 @@ fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c Held
     }
 }
 
-/// Whether a candidate of as many effects as the best fits nearly as well, and is told from it by the held-out recordings.
+/// Whether a candidate of as many effects as the best fits nearly as well, and the held-out recordings decide between the two.
 pub(crate) fn decided_by_unseen(search: &Search, c: &Candidate, best: &Candidate) -> bool {
     let alike = tuning().claim.alike;
     c.structure.added.len() == best.structure.added.len()
@@ -156,7 +157,7 @@ fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
         && predicts(search, base, better)
 }
 
-/// Structures of as many effects that cannot be told from the best: another place, or a law that does not contain its own.
+/// Structures of as many effects that cannot be distinguished from the best: another place, or a law that does not contain its own.
 pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
     let differs = |c: &Candidate| match exchanged(best, c) {
         (own, other) if own.len() == 1 && other.len() == 1 => {
@@ -203,8 +204,9 @@ pub(super) struct Richer<'s> {
     pub contains: bool,
 }
 
-/// Structures that lose for their numbers alone: one effect exchanged for a law with more of them, which fits as well. That a simpler law is preferred says nothing of
-/// what the device does where it was not recorded. The simplest first; none where the best leaves more than noise, for there a richer law fits what is none of its own.
+/// Structures that lose only because of their number of parameters: one effect is exchanged for a law with more of them, which fits as well. The preference
+/// for a simpler law is no evidence on the device outside the recorded range. The simplest first. None where the best leaves more than noise, for there a
+/// richer law fits what is not its own.
 pub(super) fn richer<'s>(search: &'s Search, best: &Candidate) -> Vec<Richer<'s>> {
     if best.levels.iter().any(|level| *level > tuning().noise.unexplained) {
         return Vec::new();
@@ -245,12 +247,12 @@ pub(super) fn nearest<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candi
     rivals
 }
 
-/// Whether a physics has another one as a special or limiting case, or is the same.
+/// Whether an effect has another one as a special or limiting case, or is the same.
 fn has_as_limit(rich: &Physics, own: &Physics) -> bool {
     withheld(&[own.name]).contains(&rich.name)
 }
 
-/// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
+/// Whether an effect has another one, or one of its family at the same place, as a special or limiting case.
 pub(super) fn contains(rich: &Physics, own: &Hypothesis) -> bool {
     withheld(&[own.physics.name]).contains(&rich.name) || rich.family == own.physics.family
 }

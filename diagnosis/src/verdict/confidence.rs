@@ -1,7 +1,7 @@
 //! How sure a finding is: the probability that physics and place are right, from what the recordings say for it and against its rivals.
 //!
-//! A logistic regression over a few figures of each finding, whose coefficients were found on drawn cases with a sealed truth and judged on others
-//! (docs/diagnosis.md says how, and what the reliability is).
+//! A logistic regression over a few figures of each finding. Its coefficients were found on drawn cases with a sealed truth and judged on others
+//! (docs/diagnosis.md describes how, and gives the reliability).
 
 use super::choice::{contains, everywhere, evidence};
 use crate::candidate::Candidate;

@@ -15,8 +15,8 @@ use crate::work::Budget;
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-experiment.toml";
 
-/// What would tell rivals apart, confirm what remains, determine numbers or move the device, or why nothing would, and the excitation file; looked for
-/// with this budget. The decision is settled by it: two explanations are ambiguous where an experiment tells them apart.
+/// The experiment that would separate rivals, confirm what remains, determine parameters or move the device, or why none would, and the excitation file.
+/// The search for it has this budget. It completes the decision: two explanations are ambiguous where an experiment separates them.
 pub(super) fn next_experiment<'a, 's>(
     problem: &'a Problem,
     search: &'s Search,
@@ -87,7 +87,7 @@ fn is_kin(best: &Candidate, other: &Candidate) -> bool {
     own.len() == rest.len() && own.iter().all(|h| rest.iter().any(|o| o.place.same(&h.place) && o.physics.family == h.physics.family))
 }
 
-/// The experiment that determines what the recordings leave open, by the intervals that the verdict tells.
+/// The experiment that determines what the recordings leave open, by the intervals that the verdict reports.
 fn determine<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let best = decision.best;
     let all: Vec<usize> = (0..best.structure.free.len()).collect();

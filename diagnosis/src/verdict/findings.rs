@@ -78,7 +78,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
     }
 }
 
-/// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
+/// A finding with rivals is not certain: the probability that it or one of its rivals is right is shared among them by how near they come.
 pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
     if search.forces.is_some() {
         return; // the beliefs contain the rivals already
@@ -119,7 +119,7 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
     }
 }
 
-/// What stands in the place of one hypothesis in structures that are else the same, its structure, and how far it is behind.
+/// The alternative to one hypothesis in structures that are otherwise the same, its structure, and how far it is behind.
 fn rivals<'s>(search: &'s Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, &'s Candidate, f64)> {
     let own = &best.structure.added[which];
     let others: Vec<&str> = best.structure.added.iter().filter(|h| h.id != own.id).map(|h| h.id.as_str()).collect();

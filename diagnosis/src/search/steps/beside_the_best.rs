@@ -1,4 +1,4 @@
-//! Hypotheses screened anew beside a structure that was found.
+//! Hypotheses screened again with a structure that was found.
 
 use super::step::{Race, Step, Terms};
 use crate::candidate::{Candidate, distinct_structures, simplest_of};

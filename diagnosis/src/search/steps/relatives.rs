@@ -34,8 +34,8 @@ impl Step for Relatives {
     }
 }
 
-/// Simpler laws of the same family in the place of each effect of the best. Where residuals remain, also laws that are as simple, and laws that contain it:
-/// an effect of one joint is often found as its nearest simple law, beside which no other effect can be found.
+/// Simpler laws of the same family instead of each effect of the best. Where residuals remain, also laws that are as simple, and laws that contain it. An
+/// effect of one joint is often found as its nearest simple law, and no other effect can be found while that law is in the structure.
 fn relatives(course: &Course, found: &[Candidate], done: bool) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
     let own = course.effects_of(&best.structure, &best.fit.values);

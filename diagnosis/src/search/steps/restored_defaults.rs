@@ -8,7 +8,7 @@ use crate::search::state::State;
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
-/// A law beside a stated parameter of its kind in the neighbourhood, which starts where that has given back what it may have absorbed.
+/// A law next to a stated parameter of its kind in the neighbourhood. Its start re-initialises that parameter, which may have absorbed the effect.
 pub(crate) struct RestoredDefaults;
 
 impl Step for RestoredDefaults {
