@@ -126,7 +126,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     }
 }
 
-/// Says so where the sensors leave the force so open that its cloud cannot speak for or against a law.
+/// A sentence for the case that the sensors leave the force so uncertain that its cloud is no evidence for or against a law.
 fn loose(main: &Trace, unit: &str) -> Option<String> {
     let mut wide: Vec<f64> = main.deviation.iter().copied().filter(|d| d.is_finite()).collect();
     wide.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! What every part of the page says in the same way.
+//! Phrases that every part of the page uses in the same way.
 
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::verdict::Word;

@@ -1,4 +1,4 @@
-//! What a verdict of one axis says in words, for terminal and page.
+//! The verdict of one axis in words, for terminal and page.
 
 use backdrive_diagnosis::error_budget::{BudgetedError, Source};
 use backdrive_diagnosis::hypothesis::Family;

@@ -13,7 +13,7 @@ const BARE: f64 = 90.0;
 /// One gain of a sweep, and what the loop did at it.
 pub type Point = (f64, Run);
 
-/// The sweep, or the search for the edge where nothing was swept.
+/// The sweep, or the search for the critical gain where nothing was swept.
 pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
     let again = found.resimulated.as_ref();
     let swept: Vec<(f64, Outcome)> = match again {

@@ -1,4 +1,4 @@
-//! The loop as it was measured: Nyquist and Bode plots, edges and their intervals.
+//! The measured loop: Nyquist and Bode plots, critical gains and their intervals.
 
 use super::words::interval;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, si};
@@ -108,7 +108,7 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     });
 }
 
-/// One curve per amplitude, with discs, and where it meets the edge.
+/// One curve per amplitude, with discs, and where it meets the stability limit.
 fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Plot {
     let mut plot = Plot::new(&format!("{title}Nyquist plot of the loop L")).x_axis("Re L", "").y_axis("Im L", "").equal_aspect();
     plot = plot.include(1.0, 0.0).include(0.0, 0.0);
@@ -220,19 +220,19 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
     Figure::stacked([magnitude, phase, coherence])
 }
 
-/// Which of the estimates has the lowest edge.
+/// Which of the estimates has the lowest critical gain.
 fn first_edge(found: &[(&LevelEstimate, &AxisEstimate)]) -> Option<usize> {
     let edge = |i: &usize| found.get(*i).and_then(|(_, a)| a.edge.gain).unwrap_or(f64::INFINITY);
     (0..found.len()).min_by(|a, b| edge(a).total_cmp(&edge(b)))
 }
 
-/// L at a line that tells something, per unit gain.
+/// L at a line that carries information, per unit gain.
 fn told(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
     let told = axis.told.get(line).copied().unwrap_or(false);
     axis.l.get(line).copied().filter(|l| told && l.iter().all(|v| v.is_finite()))
 }
 
-/// Phase over the lines that are told, degrees, without jumps of a turn between neighbours.
+/// Phase over the lines that carry information, degrees, without jumps of a turn between neighbours.
 fn unwrapped(axis: &AxisEstimate) -> Vec<f64> {
     let mut before: Option<f64> = None;
     (0..axis.l.len())

@@ -130,7 +130,7 @@ fn lead(found: &Answer) -> String {
     format!("{verdict}.{edge}")
 }
 
-/// Each method's verdict and edge.
+/// Each method's verdict and critical gain.
 fn methods(found: &Answer) -> Table {
     let mut table = Table::new(["method", "verdict", "critical μλ", "95 % interval", "frequency", "why"]);
     let edge = |gain: Option<f64>, least: Option<f64>| match (gain, least) {
