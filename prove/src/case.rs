@@ -6,7 +6,7 @@ use crate::score::{Finding, Mark};
 use backdrive_diagnosis::verdict::Word;
 use serde_json::{Value, json};
 
-/// Noise floors from which on an effect counts as one that shows.
+/// Least refitted error at which an effect counts as shown, in standard deviations of the sensor noise.
 pub const SHOWS: f64 = 3.0;
 
 /// What a user has without a diagnosis: the honest measure of a canceller is its stable gain over the best of these.
@@ -42,7 +42,7 @@ pub struct Case {
     pub marks: Vec<Mark>,
     /// Whether something nonlinear was concealed.
     pub nonlinear: bool,
-    /// Error on recordings that no fit has seen, as shares of their deviation: as given, refitted, diagnosed.
+    /// Error on held-out data, as shares of their deviation: as given, refitted, diagnosed.
     pub held_out: [Option<f64>; 3],
     /// The refitted one of these over the noise floor: how far the recordings are from what the nominal model with other numbers can do.
     pub refit_floors: Option<f64>,
@@ -50,7 +50,7 @@ pub struct Case {
     pub gains: Vec<Gain>,
     /// Time that the loop with the canceller that estimates the hand takes to settle after a change of the grip, at half its stable gain, s: the median.
     pub recovery_s: Option<f64>,
-    /// The live graph at gains about the edges without a canceller and with the diagnosed and the chosen one.
+    /// The live graph at gains about the critical gains without a canceller and with the diagnosed and the chosen one.
     pub live: Vec<LiveRun>,
     /// Share of the diagnosed estimate that was chosen where the grip is uncertain, 0 for no canceller; `None` where no gain was raised.
     pub share: Option<f64>,
@@ -92,8 +92,8 @@ impl Case {
         Some(kind.map_or("other physics", |(kind, _)| kind))
     }
 
-    /// Whether the recordings show what is concealed: the nominal model, with whatever numbers fit best, stays [`SHOWS`] noise floors and more away
-    /// from recordings that no fit has seen. Below that its numbers take the effect on.
+    /// Whether the recordings show what is concealed: the error of the nominal model on held-out data, with any refit, is at least [`SHOWS`] standard
+    /// deviations of the sensor noise. Below that its parameters absorb the effect.
     pub fn shows(&self) -> bool {
         self.refit_floors.is_none_or(|floors| floors >= SHOWS)
     }

@@ -60,8 +60,8 @@ pub struct Handed {
     pub refitted: bool,
 }
 
-/// Marks a verdict's findings for an effect. Where it can only be told from the model's numbers, or from what an unmeasured hand may do, the
-/// right verdict names nothing; and where those numbers were refitted before, they may be right already.
+/// Marks a verdict's findings for an effect. Where it can only be distinguished by the model's parameters, or by what an unmeasured hand may do, the right
+/// verdict names nothing. Where those parameters were refitted before, they may be right already.
 pub fn mark(effect: &Effect, word: Word, findings: &[Finding], handed: Handed) -> Mark {
     let possible = || effect.accept.iter().filter(|answer| handed.hand_hidden || !answer.hand_hidden);
     let says = |name: &str| name == word.name() || handed.refitted && name == Word::Parameters.name() && word == Word::NothingMissing;
