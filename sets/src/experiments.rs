@@ -8,7 +8,7 @@ use backdrive_plant::model::Model;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What an experiment records: the device as held, its grip a part of the model, or the specimen of a rig, and where each signal is told.
+/// What an experiment records: the device as held, its grip a part of the model, or the specimen of a rig, and the topic and field of each signal.
 pub struct Device {
     model: Model,
     /// Signal, topic, field.
@@ -87,7 +87,7 @@ impl Device {
         Some(Device { model, columns })
     }
 
-    /// The specimen, moved as the ram moved and pushed as the load cell says.
+    /// The specimen, moved as the ram moved and pushed with the force of the load cell.
     fn on_rig(graph: &Graph, index: usize) -> Result<Device, SetError> {
         let Settings::Rig(DeviceFiles { fragment: Some(specimen), .. }, ..) = &graph.nodes[index].settings else {
             return Err(SetError::new(format!("{}: experiments need a specimen on the rig", graph.path.display())));

@@ -1,8 +1,14 @@
 //! Numbers to start from: inertia, damping and stiffness of one body, from what drives it and what it does.
 //!
-//! Multiplied by a bump g that vanishes at both ends together with its slope, and integrated by parts, the equation of motion
-//! f = m x'' + b x' + k x + c becomes  ∫g f = m ∫g''x - b ∫g'x + k ∫g x + c ∫g: linear in the unknowns, and nothing measured is differentiated
-//! (Shinbrot 1957, modulating functions). One such row for every place of the bump, and least squares.
+//! The equation of motion f = m x'' + b x' + k x + c is multiplied by a bump g that vanishes at both ends together with its slope.
+//! Integration by parts gives
+//!
+//! ```text
+//! ∫g f = m ∫g''x - b ∫g'x + k ∫g x + c ∫g
+//! ```
+//!
+//! This is linear in the unknowns, and nothing measured is differentiated (Shinbrot 1957, modulating functions). One such row for every place of
+//! the bump, and least squares.
 
 use nalgebra::{DMatrix, DVector};
 
