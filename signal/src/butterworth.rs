@@ -47,7 +47,7 @@ impl Butterworth {
         Butterworth { sections, begun: false }
     }
 
-    /// Whether everything passes as it is.
+    /// Whether every signal passes unchanged.
     pub fn passes_all(&self) -> bool {
         self.sections.is_empty()
     }
