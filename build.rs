@@ -1,6 +1,7 @@
-//! Tells the program which commit it was built from, for `--version`.
+//! Passes to the program the commit it was built from, for `--version`.
 //!
-//! `BACKDRIVE_COMMIT` says it where there is no git (a container, a package's build); otherwise git is asked. A source without either has its version alone.
+//! `BACKDRIVE_COMMIT` states it where there is no git (a container, a package's build); otherwise git is asked. A source without either has its version
+//! alone.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

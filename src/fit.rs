@@ -1,4 +1,4 @@
-//! `backdrive fit`: a model's parameters refitted to recordings, its structure as it is.
+//! `backdrive fit`: a model's parameters refitted to recordings, its structure unchanged.
 
 use crate::cli;
 use crate::columns::columns;
@@ -33,7 +33,7 @@ use std::time::Duration;
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;
 
-/// What a fit says.
+/// The result of a fit.
 struct Fitted {
     rows: Vec<Row>,
     pairs: Vec<Pair>,
@@ -45,7 +45,7 @@ struct Fitted {
     model: String,
 }
 
-/// Fits, writes, and says how sure the numbers are.
+/// Fits, writes, and prints the confidence intervals of the parameters.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let model = Model::load(&options.model)?;
     if !model.servos.is_empty() {

@@ -16,7 +16,7 @@ use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
 use std::path::{Component, Path, PathBuf};
 
-/// Simulates, writes the predictions, and says how far they are from what was recorded.
+/// Simulates, writes the predictions, and prints their difference from what was recorded.
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
     if !model.servos.is_empty() {

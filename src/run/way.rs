@@ -55,7 +55,7 @@ pub fn run_graph(graph: &Graph, way: &Way) -> Result<Done, Failure> {
     }
 }
 
-/// What would stop a run is told before it begins.
+/// Reports what would stop a run before it begins.
 fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
     buildable(graph)?;
     // A run that ends with its last step, for a bag that cannot be written, would be lost whole.

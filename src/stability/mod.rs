@@ -1,4 +1,4 @@
-//! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the edge.
+//! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the stability limit.
 
 mod curve;
 mod loaded;
