@@ -126,7 +126,7 @@ fn best_second_order(what: &str, start: &Graph, outcome: impl Fn(&Graph, f64) ->
         }
         graph
     };
-    // A coarser search for the edge than the table's: only the order of candidates matters.
+    // A coarser search for the critical gain than the table's: only the order of candidates matters.
     let edge = |values: &[f64; 3]| {
         let graph = with_numbers(values);
         let gains = (0..).map(|i| 0.2 * 1.05_f64.powi(i)).take_while(|g| *g < HIGHEST);

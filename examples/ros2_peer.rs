@@ -145,7 +145,7 @@ fn ping(ros2: &mut Ros2, count: u64, hz: f64) -> Result<(), TransportError> {
             match subscriber.receive()? {
                 Some(m) if m.sequence() == i => {
                     round.push(now_ns() - sent);
-                    // The echo says when it heard.
+                    // The echo states when it heard.
                     there.push(m.stamp_ns() - sent);
                     break;
                 }

@@ -138,7 +138,7 @@ fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<Case
     let hand = hand_of(&base.graph);
     let edge = |trial: &Trial| trial.edge(&hand, 1.0, &NEVER).ok().and_then(|e| e.critical_gain.or(Some(20.0)));
     let base_edge = edge(&base)?;
-    // Well below the edge that the loop has without the fault.
+    // Well below the critical gain that the loop has without the fault.
     let lambda = match kind {
         "gain" | "canceller" => base_edge * between(1.3, 4.0),
         _ => base_edge * between(0.15, 0.6),

@@ -133,7 +133,7 @@ fn live_edge(graph: &Graph) -> Option<f64> {
                 if at(graph, middle) == Outcome::Stable { low = middle } else { high = middle }
             }
             let edge = (low * high).sqrt();
-            // Near the edge the verdict may change more than once: the lowest gain that is not stable counts.
+            // Near the stability limit the verdict may change more than once: the lowest gain that is not stable counts.
             let around = [0.88, 0.91, 0.94, 0.96, 0.98].map(|f| f * edge);
             return Some(around.into_iter().find(|g| at(graph, *g) != Outcome::Stable).unwrap_or(edge));
         }

@@ -100,7 +100,7 @@ pub fn diagnose_into(
     report: Option<&Path>,
     stop: &AtomicBool,
 ) -> Result<Diagnosed, Failure> {
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
     let files = opened.files;

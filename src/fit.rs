@@ -187,7 +187,7 @@ fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn
     let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();
     all.extend(kept.iter().map(|row| Row { value: row.given.unwrap_or(row.value), at_bound: false, moved_sd: None, ..row.clone() }));
     all.sort_by_key(|row| problem.stated.iter().position(|s| row.name.starts_with(&s.path)).unwrap_or(usize::MAX));
-    // Nothing that was kept stands in what is edited, so that it stays in the text as it was.
+    // Edits name no kept parameter, so the kept ones remain unchanged in the text.
     let model = match free.stated.iter().all(|s| kept.iter().any(|k| k.name == s.path)) {
         true => problem.text.clone(),
         false => refitted_text(&free, &nominal, &spread).map_err(Failure::input)?,

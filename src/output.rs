@@ -32,7 +32,7 @@ pub fn line(result: impl Display) -> Result<(), Failure> {
 /// # Errors
 /// As [`line()`].
 pub fn text(result: impl Display) -> Result<(), Failure> {
-    // At once: a text that is half written before the error tells no more than none.
+    // At once: a text that is half written before the error is of no more use than none.
     let bytes = result.to_string();
     if caller::kept(&bytes) {
         return Ok(());

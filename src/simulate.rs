@@ -111,7 +111,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
             .map(|file| {
                 let rules = set.rules_of(file);
                 let recording = read_recording(&set.path_of(file), model, &set.columns, &rules.piece)?;
-                // A recording that lies elsewhere is simulated into the folder all the same, and not onto itself.
+                // A recording outside the folder is simulated into the folder all the same, and not onto itself.
                 let path = Path::new(file);
                 let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
                 let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };

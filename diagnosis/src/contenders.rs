@@ -85,7 +85,7 @@ fn contenders<'a>(problem: &'a Problem, search: &Search, without: &[String], bud
         return Vec::new();
     };
     let fitted = budget.abreast(&seeds, |budget, seed| fit(&evaluator.within(budget.clone()), (best, limit * there), seed));
-    // A fit that was cut short on its way says nothing of its law.
+    // A fit that was cut short is no evidence on its law.
     let is_done = |fit: &Fit| effective * 2.0 * fit.predicted_decrease < tuning().claim.alike * fit.cost;
     let near = fitted.into_iter().flatten().flatten().filter(|(_, fit)| fit.cost < limit * best.fit.cost && is_done(fit));
     let held_out = |mut c: Candidate| {

@@ -34,7 +34,7 @@ impl Excerpts {
             return None;
         }
         let model = structure.model(problem, &fit.values)?;
-        // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
+        // Firmly coupled, so that a part begins with the measured motion, not with the motion of an incomplete model.
         let firm = evaluator.coupling.as_ref().map(|g| g.with(tuning().coupling.firm * g.strength));
         let layout = evaluator.layout();
         // No part can begin with a memory of what came before.

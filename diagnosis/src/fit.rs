@@ -139,7 +139,7 @@ impl<'e, 'a> Descent<'e, 'a> {
     ) -> Option<Descent<'e, 'a>> {
         let numbers = &structure.free;
         let own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.to_internal(*v)).collect();
-        // A weight that a part of a recording says nothing of stays where it is.
+        // A weight on which a part of a recording carries no information stays where it is.
         let centred = |(n, x): (&FreeParameter, &f64)| {
             n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread))
         };

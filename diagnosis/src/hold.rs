@@ -101,7 +101,7 @@ pub fn told(evaluator: &Evaluator, fitted: &Candidate) -> Vec<Told> {
         projector.apply(&mut left);
         let size = dot(&column, &column);
         let share = if size > 0.0 { -dot(&column, &left) / size } else { 0.0 };
-        // Each residual is one of so many that go together; what the model leaves counts as noise.
+        // Neighbouring residuals are correlated, so each counts for less than one; the residual of the model counts as noise.
         let unit = (dot(&left, &left) / left.len().max(1) as f64).max(1.0) * fitted.correlation_time;
         let deviation = if size > 0.0 { (unit / (size * stride as f64)).sqrt() } else { f64::INFINITY };
         Some(Told { input, changes, share, deviation })

@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn numbers_that_go_together_are_nearer_than_each_says() {
         let of = |off: [f64; 2], rho: f64| distance_square(&off, DMatrix::from_row_slice(2, 2, &[1.0, rho, rho, 1.0]));
-        // 2/(1 + rho) along the direction in which they go together, 2/(1 - rho) across it.
+        // 2/(1 + rho) along the direction in which they vary jointly, 2/(1 - rho) across it.
         for rho in [0.0, 0.5, 0.9] {
             assert!((of([1.0, 1.0], rho) / (2.0 / (1.0 + rho)) - 1.0).abs() < 1e-4);
             assert!((of([1.0, -1.0], rho) / (2.0 / (1.0 - rho)) - 1.0).abs() < 1e-4);

@@ -174,7 +174,7 @@ mod tests {
         // A drift of what nothing holds is no lack of repetition.
         assert!(periods(&drift, &[20]).iter().all(|found| found.1 < 1e-3));
         assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin), &[0]).is_empty());
-        // Of a long and slow input no period of no length is told.
+        // For a long and slow input no period of any length is reported.
         assert!(periods(&record(60_000, 1e-3, |t| (0.02 * t).sin(), f64::sin), &[0]).iter().all(|found| found.2 > 0.0));
         // A rhythm that it comes to over many periods is no lack of repetition either.
         let settling = |t: f64| (std::f64::consts::TAU * t / 0.5).cos() + 0.2 * (-t).exp();

@@ -202,7 +202,7 @@ impl<'b, 'a> Beside<'b, 'a> {
         };
         let values = [start.to_vec(), weakened(&self.hypotheses[index], start)];
         let (full, weak) = (measured(&values[0]), measured(&values[1]));
-        // One residual in so many was kept.
+        // One residual in `stride` was kept.
         let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
         Effect { hypothesis: index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
     }

@@ -220,7 +220,7 @@ fn a_drift_in_what_no_fit_has_seen_counts_but_once() {
     let held = |problem: &Problem| unseen(problem, &problem.held_out, &structure, &values, &noise_sd).unwrap();
     let noise = held(&problem);
     assert!(noise.mean_square < 1.2 && noise.correlation_time < 1.3, "{noise:?}");
-    // Half a period of a wave of six floors over the whole of the recording: one observation, or a few.
+    // Half a period of a wave of six noise standard deviations over the whole of the recording: one observation, or a few.
     let samples = problem.held_out[0].outputs[0].as_mut().unwrap();
     let length = samples.len() as f64;
     samples.iter_mut().enumerate().for_each(|(i, y)| *y += 6.0 * noise_sd[0] * (std::f64::consts::PI * i as f64 / length).cos());

@@ -90,7 +90,7 @@ pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), SetError> {
 pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
     if set.held_out.is_empty() {
         match set.fit.len() {
-            // Who says in a set.toml what is fitted means it.
+            // Where a set.toml states what is fitted, that is not changed.
             _ if told => notes.push(
                 "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
                     .to_string(),
@@ -137,7 +137,7 @@ fn unfinished(path: &Path) -> Option<String> {
     if !reader.ended_cleanly() {
         return Some(format!("{name} was not closed: {recover}"));
     }
-    // A bag of its own, whatever it says of itself: by its messages.
+    // A bag of its own, whatever its header states: by its messages.
     let faults = Account::of(&reader).ok()?.faults;
     let (first, more) = (faults.first()?, faults.len() - 1);
     let others = if more > 0 { format!(", and {more} more: `backdrive bag info --check {name}` says all") } else { String::new() };

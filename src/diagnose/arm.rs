@@ -47,7 +47,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     }
     let mut notes = arm_options::notes(options, set)?;
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
     let stop = interrupt::heard()?;
@@ -168,7 +168,7 @@ fn text(problem: &Problem, found: &Found) -> String {
             );
         }
     }
-    // Where nothing else is claimed the sentence says it.
+    // Where nothing else is claimed the sentence states it.
     let beside = verdict.arm.iter().filter(|_| verdict.word != Word::Unexplained);
     for joint in beside.flat_map(|arm| &arm.joints) {
         if let Some(open) = unexplained(joint) {

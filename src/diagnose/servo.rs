@@ -49,7 +49,7 @@ pub fn diagnose(
     let files: Vec<PathBuf> =
         model.map(Path::to_path_buf).into_iter().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     open::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
     let problem = Problem::open(set, model).map_err(Failure::input)?;

@@ -90,7 +90,7 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     let report = backdrive_launch::run(graph, &place, options)?;
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
-    // What is known of the run is told even where its bag cannot be read.
+    // What is known of the run is reported even where its bag cannot be read.
     let read = |bag: &PathBuf| (summarise(bag), whole(bag));
     let read = bag.as_ref().map(|bag| progress::busy(&format!("reading {}", bag.display()), || read(bag)));
     let (summary, (complete, mut unreadable)) = read.map_or((None, (false, None)), |(summary, whole)| (Some(summary), whole));

@@ -25,7 +25,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let loaded = progress::busy(&format!("reading {}", options.recording.display()), || Loaded::read(options))?;
     let question = loaded.question(options)?;
     if let Some(html) = &options.html {
-        // A report that cannot be written is told before the work, not after it.
+        // A report that cannot be written is reported before the work, not after it.
         output::writable(html)?;
     }
     let curve = match &options.sweep {

@@ -130,7 +130,7 @@ impl Margins {
                     self.lowest = Some(*margin);
                 }
             }
-            // Free motion at the end says nothing of the contact before it.
+            // Free motion at the end is no evidence on the contact before it.
             known::FREE if self.unknown.is_some() => {}
             _ => self.unknown = Some(*margin),
         }

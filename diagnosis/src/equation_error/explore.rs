@@ -86,7 +86,7 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
             before.truncate(tuning().equation_error.extended);
         }
     }
-    // Where a drive rests and logs zeros there is no error at all: what is far below what the best leaves says nothing, of whichever structure.
+    // Where a drive rests and logs zeros there is no error at all. A residual far below that of the best structure carries no information on any structure.
     let best = all.values().min_by(|a, b| a.mean().total_cmp(&b.mean()))?.clone();
     let floor = |((room, scale), left): ((&Room, &f64), &Left)| tuning().equation_error.floor * mean(&room.mean_square(left)) / scale;
     let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.left).map(floor).collect();

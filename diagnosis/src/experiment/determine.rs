@@ -37,7 +37,7 @@ pub fn excite<'a>(
     let own: Vec<f64> = structure.free.iter().zip(values).map(|(n, v)| n.to_internal(*v)).collect();
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
-    // What is told over what the sensors' noise alone makes of it.
+    // The reported standard deviation, divided by the one caused by the sensors' noise alone.
     let ratio = |(own, told): (&f64, &f64)| Some(told / own).filter(|ratio| ratio.is_finite() && *ratio > 0.0).unwrap_or(1.0);
     let wider: Vec<f64> = known.deviations(None).iter().zip(told).map(ratio).collect();
     let before = told;

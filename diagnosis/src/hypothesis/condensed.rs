@@ -35,7 +35,7 @@ impl Hypothesis {
         };
         let ends = ends.map(inertia);
         let lightest = ends.iter().flatten().map(|(_, own)| *own).fold(f64::INFINITY, f64::min);
-        // Where no spring holds the joint, nothing was absorbed that would have to be given back.
+        // Where no spring holds the joint, nothing was absorbed that would have to be re-initialised.
         if !lightest.is_finite() || stiffness <= 0.0 {
             return Vec::new();
         }

@@ -146,7 +146,7 @@ impl Samples {
         let place = |z: f64| -> f64 {
             match bins {
                 Bins::Even(_) => (z - low) / (high - low).max(f64::MIN_POSITIVE),
-                // Finer about zero, and with an edge at it.
+                // Finer about zero, and with a boundary at it.
                 Bins::FinerAtZero(_) => 0.5 + 0.5 * (BOW * z / rms).asinh() / (BOW * peak / rms).asinh(),
                 Bins::Log(_) => 1.0 + (z.abs() / peak).max(1e-3).log10() / 3.0,
             }

@@ -102,7 +102,7 @@ impl Problem {
             for file in files {
                 match record(set, file, &model, &unknown) {
                     Ok(record) => records.push(record),
-                    // One short file says nothing, and does not keep the others from being diagnosed.
+                    // One short file carries no information, and does not keep the others from being diagnosed.
                     Err(ProblemError::Short { name, count, .. }) => left_out.push((name, count)),
                     Err(error) => return Err(error),
                 }
@@ -149,7 +149,7 @@ impl Problem {
     /// the device, and has no noise to normalise a residual. Also the names of the omitted outputs.
     pub fn without_dead_outputs(self) -> (Problem, Vec<String>) {
         let is_still = |output: usize| {
-            // The same value in all of them: a device may also stand still in each recording, elsewhere in the next.
+            // The same value in all of them: a device may also stand still in each recording, at another position in the next.
             let mut samples = self.fit.iter().chain(&self.held_out).filter_map(|r| r.compared(output)).flatten();
             samples.next().is_some_and(|first| samples.all(|x| x == first))
         };
@@ -240,14 +240,14 @@ mod tests {
         let (left, dead) = problem(&|t| t * t, [9.999847; 2]).without_dead_outputs();
         assert_eq!(dead, ["v"]);
         assert!(left.fit.iter().chain(&left.held_out).all(|r| r.outputs[0].is_some() && r.outputs[1].is_none()));
-        // Still in each recording, and elsewhere in the next, is no rail.
+        // Still in each recording, and at another position in the next, is no rail.
         assert!(problem(&|t| t * t, [1.0, 2.0]).without_dead_outputs().1.is_empty());
         // An effect on the way of a signal that nobody measured is part of what is fitted as that signal.
         let mut unmeasured = problem(&|t| t * t, [1.0, 2.0]);
         assert!(!unmeasured.is_unmeasured(&Place::Signal("f".to_string())));
         unmeasured.unknown = vec![Unknown { input: 0, bandwidth_hz: 2.0 }];
         assert!(unmeasured.is_unmeasured(&Place::Signal("f".to_string())) && !unmeasured.is_unmeasured(&Place::Signal("x".to_string())));
-        // Where nothing moves the device may be stuck, and the audit says what there is to say.
+        // Where nothing moves the device may be stuck, and the audit reports that.
         let (left, dead) = problem(&|_| 0.0, [9.999847; 2]).without_dead_outputs();
         assert!(dead.is_empty() && left.fit[0].outputs[1].is_some());
     }

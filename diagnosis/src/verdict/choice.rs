@@ -94,8 +94,8 @@ fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     };
     match (&base.unseen, &better.unseen) {
         (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => {
-            // A device that drifts freely may end elsewhere after the least difference. Where the fits explain all there is, it is enough that the unseen
-            // recordings do not speak against it.
+            // A device that drifts freely may end in another place after the least difference. Where the fits explain all there is, it is enough that the
+            // unseen recordings are no evidence against it.
             let at_floor = |c: &Candidate| c.levels.iter().all(|level| *level < tuning().noise.unexplained);
             let explained = at_floor(better) && !at_floor(base);
             a.gain_over(b).is_none_or(|gain| gain.is_sure() || explained && gain.mean > 0.0)
@@ -116,7 +116,7 @@ fn order(h: &Hypothesis) -> usize {
 /// criteria with effective samples.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     let evidence = advantage_over(base, better, search.samples) + unseen_evidence(search, base, better);
-    // What irregular clocks and sensors come to tells no two apart.
+    // An error of the size of that of irregular clocks and sensors separates no two structures.
     let least = of_sensors(&search.errors);
     let apart = mean_square_let_go(search, base, better) - mean_square_let_go(search, better, base);
     if apart.abs() < least { evidence.clamp(-0.5 * tuning().claim.alike, 0.5 * tuning().claim.alike) } else { evidence }

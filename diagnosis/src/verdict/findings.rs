@@ -89,7 +89,7 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
         let Some(own) = best.structure.added.iter().find(|h| is_it(h)) else { continue };
         let against: Vec<&Candidate> = rivals.iter().copied().filter(|c| exchanged(best, c).0.iter().any(|h| h.id == own.id)).collect();
         let others: f64 = against.iter().map(|c| weight(c)).sum();
-        // Of its kind are laws in its place; what stands elsewhere, or is of another kind, shares what is known of that.
+        // Of its kind are laws at its place; a law at another place, or of another kind, takes a share of the family's probability.
         let is_of_its_kind =
             |c: &&&Candidate| exchanged(best, c).1.iter().all(|h| h.place.same(&finding.place) && Some(h.physics.family) == finding.family);
         let other_kinds: f64 = against.iter().filter(|c| !is_of_its_kind(c)).map(|c| weight(c)).sum();

@@ -85,7 +85,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
     let loose = loose(main, &evidence.force_unit);
-    // A law of velocity over displacement is a fence of jumps that says nothing: loops are drawn of what depends on the path.
+    // A law of velocity over displacement is a fence of jumps without information: loops are drawn of what depends on the path.
     if loose.is_none()
         && !main.latent.displacement.is_empty()
         && !matches!(evidence.against, Against::Velocity | Against::Acceleration | Against::Time)

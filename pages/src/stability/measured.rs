@@ -116,7 +116,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         (0..=180).map(|k| (f64::from(k) * TAU / 180.0).sin_cos()).map(|(s, c)| (c, s)).unzip();
     plot = plot.series(Series::line("|L| = 1", &circle_re, &circle_im).colour(Colour::Muted).dash(Dash::Dotted).width(1.0));
     let mut seen = Vec::new();
-    // Frequencies are written at the curve whose edge comes first.
+    // Frequencies are written at the curve with the lowest critical gain.
     let first = first_edge(found);
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by_key(|i| first == Some(*i)); // the curve that decides last, on top
@@ -126,13 +126,13 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         seen.extend(re.iter().copied().zip(im.iter().copied()));
         let every = axis.l.len().div_ceil(DISCS).max(1);
         let thin = |v: &[f64]| v.iter().step_by(every).copied().collect::<Vec<f64>>();
-        // Uncertainty decides only where a disc comes near +1; elsewhere discs would smear the curve.
+        // Uncertainty decides only where a disc comes near +1; in other places discs would smear the curve.
         let near = |k: usize, r: f64| re.get(k).zip(im.get(k)).is_some_and(|(re, im)| (re - 1.0).hypot(*im) - r < NEAR_CRITICAL);
         let all = axis.sigma.iter().map(|s| DISC_95 * gain * s).enumerate();
         let radius: Vec<f64> = all.map(|(k, r)| if near(k, r) { r } else { f64::NAN }).collect();
         let name = level_name(level, found.len());
         let disc_name = if found.len() == 1 { "95 % discs" } else { "" };
-        // Of several amplitudes that with the lowest edge decides: its colour is the frequency, the others stay behind it.
+        // Of several amplitudes that with the lowest critical gain decides: its colour is the frequency, the others stay behind it.
         let leads = first == Some(i);
         let colour = if leads { Colour::Nth(0) } else { Colour::Muted };
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(colour));
@@ -197,7 +197,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
         let n = axis.l.len();
         let spread = |k: usize| INTERVAL_95 * gain * axis.sigma.get(k).copied().unwrap_or(f64::NAN);
         let values: Vec<f64> = (0..n).map(|k| db(size(k))).collect();
-        // A line that is told is at least three standard deviations, so its interval stays above zero.
+        // A line that carries information is at least three standard deviations, so its interval stays above zero.
         let lower: Vec<f64> = (0..n).map(|k| db(size(k) - spread(k))).collect();
         let upper: Vec<f64> = (0..n).map(|k| db(size(k) + spread(k))).collect();
         let band = if found.len() == 1 { "95 % interval" } else { "" };

@@ -119,7 +119,7 @@ fn lead(found: &Answer) -> String {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
         }
-        // Beyond a clamp or an end of the travel no edge can be seen.
+        // Beyond a clamp or an end of the travel no critical gain can be seen.
         (None, Some(least)) if least < found.gain.product() => {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" It is stable only up to μλ = {}{by}.", number(least))
