@@ -44,7 +44,7 @@ pub(crate) fn white(correlation_time: f64, whiteness_statistic: f64) -> bool {
     correlation_time < tuning().noise.white_correlation && whiteness_statistic < tuning().noise.white_statistic
 }
 
-/// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
+/// How good a candidate is beside others of the same search: its cost with a price on each parameter, the lower the better.
 pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f64 {
     let effective = (samples as f64 / correlation_time).max(2.0);
     effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.free.len() as f64 * effective.ln()

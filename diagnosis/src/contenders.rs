@@ -111,14 +111,15 @@ fn seeds<'h>(problem: &Problem, search: &Search, best: &Candidate, hypotheses: &
             }
         }
     }
-    // Of equals the simpler: a law of more numbers mostly does what it does as one of its limits.
+    // Of equals the simpler: a law of more parameters mostly does what it does as one of its limits.
     let numbers = |s: &Seed| s.hypothesis.parameters.len();
     all.sort_by(|a, b| numbers(a).cmp(&numbers(b)).then(b.promised.total_cmp(&a.promised)));
     all.truncate(tuning().experiment.contenders);
     all
 }
 
-/// The best with one effect exchanged, from the numbers that the rest has: the start that comes nearest in a few steps goes on, where it foresees a cost below `limit`.
+/// The best with one effect exchanged, from the other parameters' values. The start that comes nearest in a few steps goes on, where it predicts a cost
+/// below `limit`.
 fn fit(evaluator: &Evaluator, (best, limit): (&Candidate, f64), seed: &Seed) -> Option<(Structure, Fit)> {
     let problem = evaluator.problem;
     let (mut added, mut values) = (best.structure.added.clone(), best.structure.added_of(&best.fit.values));

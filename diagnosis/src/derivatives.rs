@@ -289,7 +289,7 @@ mod tests {
             .unwrap()
     }
 
-    /// By each number: carried along, where it can be, and differenced.
+    /// By each parameter: carried along, where it can be, and differenced.
     type Both = (Structure, Vec<Option<Vec<f64>>>, Vec<Vec<f64>>);
 
     fn derivatives(problem: &Problem) -> Both {

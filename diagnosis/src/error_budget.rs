@@ -1,4 +1,4 @@
-//! What is off in a prediction although no physics is missing: the integration, when samples were taken, steps of encoders.
+//! Errors in a prediction although no effect is missing: the integration, when samples were taken, steps of encoders.
 
 use crate::candidate::Candidate;
 use crate::evaluator::{Evaluator, measured};

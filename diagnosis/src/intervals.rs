@@ -14,9 +14,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// that are correlated count as fewer, and whatever is unexplained counts as error.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// One for each number; infinite where the recordings do not determine it.
+    /// One for each parameter; infinite where the recordings do not determine it.
     pub deviation: Vec<f64>,
-    /// How far each number may be off beside that, whatever the noise: what the fit's last step and finer simulation steps would move it.
+    /// How far each parameter may be off in addition, whatever the noise: what the fit's last step and finer simulation steps would move it.
     pub bias: Vec<f64>,
     /// Correlation of each with each.
     pub correlation: DMatrix<f64>,
@@ -122,13 +122,13 @@ impl Uncertainty {
         ChiSquared::new(known.len() as f64).is_ok_and(|d| d.sf(square) < tuning().claim.significance)
     }
 
-    /// Half of a number's 95 % interval, in the fit's own unit.
+    /// Half of a parameter's 95 % interval, in the fit's own unit.
     pub fn half(&self, number: usize) -> f64 {
         let deviation = self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
         tuning().intervals.wider * NORMAL_975 * deviation + self.bias.get(number).copied().unwrap_or(0.0)
     }
 
-    /// 95 % interval of a number, as it stands in the model.
+    /// 95 % interval of a parameter, in the unit of the model.
     pub fn interval(&self, candidate: &Candidate, number: usize) -> [f64; 2] {
         let (Some(n), Some(value)) = (candidate.structure.free.get(number), candidate.fit.values.get(number)) else {
             return [f64::NAN; 2];
@@ -139,7 +139,7 @@ impl Uncertainty {
         [n.to_external((own - half).max(low)), n.to_external((own + half).min(high))]
     }
 
-    /// The same, one-sided where the number is at a bound: the recordings say only that it is no less far than that. `None` for an open end.
+    /// The same, one-sided where the parameter is at a bound: the recordings then show only that it is no less far than that. `None` for an open end.
     pub fn one_sided(&self, candidate: &Candidate, number: usize) -> [Option<f64>; 2] {
         let [low, high] = self.interval(candidate, number).map(|end| Some(end).filter(|x| x.is_finite()));
         let bound = candidate.structure.free.get(number).zip(candidate.fit.values.get(number)).and_then(|(n, value)| n.at_bound(*value));
@@ -150,8 +150,8 @@ impl Uncertainty {
         }
     }
 
-    /// Adds what other explanations of nearly the same fit make of the same numbers, each with a weight of 0 to 1: numbers are as unsure as the structure
-    /// around them.
+    /// Adds the spread of the same parameters over other explanations of nearly the same fit, each with a weight of 0 to 1: parameters are as uncertain as
+    /// the structure around them.
     pub fn beside(&mut self, candidate: &Candidate, others: &[(&Candidate, f64)]) {
         let structure = &candidate.structure;
         let sum = 1.0 + others.iter().map(|(_, weight)| weight).sum::<f64>();
@@ -169,7 +169,7 @@ impl Uncertainty {
     }
 }
 
-/// Whether numbers of two structures are the same one.
+/// Whether parameters of two structures are the same one.
 fn is_same(a: &Structure, number: &FreeParameter, b: &Structure, other: &FreeParameter) -> bool {
     match (&number.role, &other.role) {
         (Role::Added(h, p), Role::Added(k, q)) => {

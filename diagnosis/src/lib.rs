@@ -1,4 +1,4 @@
-//! Where model and recording part, and which physics was left out.
+//! Where model and recording part, and which effects the model lacks.
 //!
 //! [`problem::Problem`] is a nominal model and its recordings, and [`fit`] refits a structure by simulation error. A [`hypothesis::Hypothesis`] is an
 //! effect at a place, and [`search`] finds which hypotheses the recordings require. [`verdict`] gives the result as a file and a model.

@@ -12,7 +12,7 @@ use crate::work::Budget;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// A number as one record alone has it.
+/// A parameter as estimated from one record alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Own {
     /// As fitted.
@@ -23,10 +23,10 @@ pub struct Own {
     pub determined: bool,
 }
 
-/// A number in every record.
+/// A parameter in every record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Across {
-    /// Path in the model; of added physics its id and key.
+    /// Path in the model; of an added effect its id and key.
     pub name: String,
     /// One for each record of [`PerRecord::records`].
     pub own: Vec<Own>,
@@ -43,7 +43,7 @@ pub struct PerRecord {
     pub records: Vec<String>,
     /// Root mean square of the residual of each record's own fit at each output, noise standard deviations.
     pub levels: Vec<Vec<f64>>,
-    /// Every number that all records share.
+    /// Every parameter that all records share.
     pub numbers: Vec<Across>,
 }
 

@@ -171,7 +171,7 @@ impl Course<'_> {
         begun.into_iter().flatten().flatten().collect()
     }
 
-    /// The last stage: so many are fitted to their ends. Those behind stay as they are: they are rivals, if beaten ones.
+    /// The last stage: the best `count` structures are fitted to their ends. Those behind are not changed: they are rivals, if beaten ones.
     fn fit_to_the_end(&self, running: &mut Vec<Running>, count: usize) {
         let (lead, effort) = (Lead::of(running), tuning().fit.to_the_end);
         let rest = running.split_off(count.min(running.len()));

@@ -16,7 +16,8 @@ use crate::verdict::{chosen, decided_by_unseen};
 use crate::work::{Budget, Limit, Steps};
 use rayon::prelude::*;
 
-/// Lets the numbers go of what is chosen, and of structures of as many effects that the unseen recordings alone tell from it. Then of what is chosen for that.
+/// Releases the parameters of the chosen structure, and of structures of as many effects that only the unseen recordings separate from it. Then those of
+/// the structure chosen for that.
 pub fn hold_with_released_parameters(problem: &Problem, search: &mut Search, limit: Limit) {
     for _ in 0..tuning().search.finalists {
         let best = chosen(search);

@@ -18,7 +18,7 @@ pub struct Promise {
     pub hypothesis: usize,
     /// Values to start a fit from.
     pub values: Vec<f64>,
-    /// Share of the cost that it would take, to first order and with every free number adjusted.
+    /// Share of the cost that it would remove, to first order and with every free parameter adjusted.
     pub share: f64,
     /// Its effects, with what the free parameters can do taken out.
     columns: Vec<Vec<f64>>,

@@ -1,4 +1,5 @@
-//! What is claimed and what is not: errors that are no physics, numbers that a refit has to find, and a law that is there although more remains.
+//! What is claimed and what is not: errors that are no effect of the device, parameters that a refit has to find, and a law that is there although more
+//! remains.
 
 use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::error_budget::Source;
@@ -256,7 +257,7 @@ kind = "velocity"
 of = "carriage"
 "#;
 
-/// While a body only moves one way, dry friction and a constant force are one number; once it also moves back they are not.
+/// While a body only moves one way, dry friction and a constant force are one parameter; once it also moves back they are not.
 #[test]
 fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_proposed() {
     let truth = format!("{PUSHED}\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"carriage\", \"ground\"]\nforce = 0.6\n");

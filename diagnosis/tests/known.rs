@@ -1,4 +1,4 @@
-//! Devices of known physics: what was left out is named, and nothing is named where nothing was.
+//! Devices with known effects: a missing one is named, and nothing is named where nothing is missing.
 
 use backdrive_diagnosis::compare::unseen;
 use backdrive_diagnosis::evaluator::Evaluator;
@@ -291,7 +291,7 @@ fn where_an_encoder_counts_from_is_a_number_of_its_session() {
     assert!((period / 4e-3 - 1.0).abs() < 1e-3, "{period}");
     assert!(said.held_out.nrmse_after.unwrap() < 1.1 * said.held_out.noise_floor.unwrap(), "{said:#?}");
 
-    // One number for the session, and one each where files are free by themselves.
+    // One parameter for the session, and one each where files are free by themselves.
     for (condition, own) in [(Condition::Shared(0), 1), (Condition::Free, 2)] {
         let problem = switched_on_again(Some(condition));
         let structure = Structure::new(&problem, &problem.held_out, Vec::new());

@@ -20,7 +20,8 @@ pub(crate) use search::search_on_forces;
 
 use crate::problem::Problem;
 
-/// What was looked at on forces, for those who calibrate its confidence: the physics of each law that is claimed, with its figures for the law and for its kind.
+/// What was examined on forces, for those who calibrate its confidence: the effect of each law that is claimed, with its figures for the law and for its
+/// kind.
 pub fn figures_of(problem: &Problem) -> Vec<(String, [Figures; 2])> {
     let rooms: Vec<room::Room> = match is_known(problem) {
         true => corners(problem).into_iter().filter_map(|corner| room::Room::of(problem, corner, &[])).collect(),

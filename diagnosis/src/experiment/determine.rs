@@ -91,7 +91,7 @@ pub fn excite<'a>(
     Ok(planner.experiment(case, sentence, names, *separation, &change, rms(&change)))
 }
 
-/// What a number is called.
+/// The name of a parameter.
 fn name_of(problem: &Problem, structure: &Structure, number: usize) -> String {
     match structure.free.get(number).map(|n| &n.role) {
         Some(Role::Stated(i)) => problem.stated.get(*i).map_or_else(String::new, |s| s.path.clone()),

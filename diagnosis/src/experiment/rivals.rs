@@ -65,7 +65,7 @@ impl<'a> Rival<'a> {
         setup.prediction(&self.as_fitted(setup.problem)?, trial)
     }
 
-    /// Derivatives of what it predicts, by each number in its own unit; all 0 for what belongs to a recording.
+    /// Derivatives of its prediction, by each parameter in its own unit; all 0 for what belongs to a recording.
     pub(super) fn jacobian(&self, setup: &Setup, trial: &Trial, own: &[f64], at: &[f64]) -> Vec<Vec<f64>> {
         let column = |(j, number): (usize, &FreeParameter)| {
             let none = || vec![0.0; at.len()];

@@ -101,7 +101,7 @@ fn separate_pairs<'a>(
     Ok(planner.separating(rivals, &cases[case], pair, separation, inseparable))
 }
 
-/// The physics that a structure adds, sorted, so that their order does not matter.
+/// The effects that a structure adds, sorted, so that their order does not matter.
 fn ids(structure: &Structure) -> Vec<&str> {
     let mut all: Vec<&str> = structure.added.iter().map(|h| h.id.as_str()).collect();
     all.sort_unstable();

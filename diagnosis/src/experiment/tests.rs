@@ -1,4 +1,4 @@
-//! Experiments chosen for devices of known physics, and what they then show.
+//! Experiments chosen for devices of known effects, and what they then show.
 
 use super::separate::separate_fitted;
 use super::*;

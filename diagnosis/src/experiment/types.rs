@@ -17,7 +17,8 @@ pub struct Experiment {
     pub between: Vec<String>,
     /// Standard deviations between the two of them that it separates least, each refitted to it.
     pub separation: f64,
-    /// Root mean square of that difference over all samples, noise standard deviations. For [`super::excite`] that of one standard deviation of the number.
+    /// Root mean square of that difference over all samples, noise standard deviations. For [`super::excite`] that of one standard deviation of the
+    /// parameter.
     pub level: f64,
     /// The output in which most of it shows.
     pub output: String,

@@ -156,9 +156,9 @@ pub struct Facts {
     pub contains: &'static [&'static str],
     /// Numbers of its law that are known beforehand, and yet are claimed with it.
     pub fixed: usize,
-    /// Whether the misfit has so many valleys over its size that fits start from sizes all over its range.
+    /// Whether the misfit has many local minima over its size, so that fits start from sizes all over its range.
     pub scanned: bool,
-    /// Its forces along a motion as sums of a few, for each choice of its nonlinear numbers; none where it is only simulated.
+    /// Its forces along a motion as sums of a few, for each choice of its nonlinear parameters; none where it is only simulated.
     pub(crate) spans: fn(&Hypothesis, &Seen) -> Vec<Span>,
 }
 
@@ -181,7 +181,7 @@ impl Seen {
     }
 }
 
-/// Forces along a motion that a law can have with the same nonlinear numbers: sums of the forces of a few sets of its parameters, each times a factor.
+/// Forces along a motion that a law can have with the same nonlinear parameters: sums of the forces of a few sets of its parameters, each times a factor.
 #[derive(Debug, Clone)]
 pub(crate) struct Span {
     /// Parameters whose forces span all of them.
@@ -292,7 +292,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// A number that a hypothesis adds.
+/// A parameter that a hypothesis adds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Its name in a verdict.
@@ -318,7 +318,7 @@ pub struct Parameter {
 pub struct Hypothesis {
     /// Such as `coulomb@drum-ground`: unique among the hypotheses of a model.
     pub id: String,
-    /// Which physics.
+    /// Which effect.
     pub physics: &'static Physics,
     /// Where it sits.
     pub place: Place,
@@ -328,7 +328,7 @@ pub struct Hypothesis {
     pub parameters: Vec<Parameter>,
     /// Where fits start, most plausible first: one value for each parameter.
     pub starts: Vec<Vec<f64>>,
-    /// Path of a number that the model states and that does the same; nothing is gained where a fit has that one free.
+    /// Path of a parameter that the model states and that does the same; nothing is gained where a fit has that one free.
     pub same_as: Option<String>,
     /// Equal for hypotheses that no recording can tell apart.
     pub class: String,

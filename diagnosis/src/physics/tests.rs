@@ -142,7 +142,7 @@ fn every_kind_that_can_be_simulated_is_proposed() {
             let ones: Vec<Vec<f64>> = k.parameters.iter().map(|_| vec![1.0]).collect();
             !matches!((k.build)(&ones), Err(e) if e.contains("not available"))
         });
-        // Its curves are loops that were measured, not numbers that a search could move; maxwell_slip is proposed for the same memory.
+        // Its curves are loops that were measured, not parameters that a search could move; maxwell_slip is proposed for the same memory.
         let measured = physics.name == "preisach_lugre";
         assert_eq!(proposed.contains(&physics.name), can && !measured, "{}", physics.name);
     }
@@ -455,7 +455,7 @@ fn friction_laws_begin_at_the_level_of_the_one_before() {
     assert!(["coulomb", "asymmetric_coulomb", "stribeck", "lugre"].iter().all(|law| seen.contains(law)), "{seen:?}");
 }
 
-/// Keys of inputs and outputs that are physics where a model file does not state them.
+/// Keys of inputs and outputs that are effects where a model file does not state them.
 const SIGNAL_KEYS: [&str; 6] = ["gain", "saturation", "delay", "bandwidth", "back_emf", "offset"];
 
 #[test]

@@ -105,7 +105,7 @@ impl<'a> Coupler<'_, 'a> {
     fn until_it_shows(&self, mut coupled: CoupledNominal<'a>, refitted: &Fit) -> CoupledNominal<'a> {
         let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
         let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(refitted));
-        // On parts the parameters may take on what differs from one part to the next: the first time only.
+        // On parts the parameters may absorb the differences from one part to the next: the first time only.
         for (nth, strength) in tuning().search.couplings.iter().enumerate() {
             if left(&coupled.fit) > enough {
                 break;
@@ -300,7 +300,7 @@ fn few_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], refitt
     None
 }
 
-/// Near the noise the end of a fit counts: the residual short of it looks like missing physics.
+/// Near the noise the end of a fit counts: the residual short of it looks like a missing effect.
 pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
     let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < tuning().noise.far);
     if !near || white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals)) {

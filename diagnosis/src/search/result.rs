@@ -37,7 +37,7 @@ pub struct Detectable {
 /// What a search found.
 #[derive(Debug)]
 pub struct Search {
-    /// What is off in the predictions of the refitted nominal model although no physics is missing.
+    /// Errors in the predictions of the refitted nominal model although no effect is missing.
     pub errors: Vec<BudgetedError>,
     /// The evidence of the refitted nominal model on inputs that are held by default.
     pub holds: Vec<Told>,
@@ -57,7 +57,7 @@ pub struct Search {
     pub samples: usize,
     /// Number of residuals of the held-out recordings.
     pub unseen_samples: usize,
-    /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
+    /// What would have been seen with the refitted nominal model, each effect at the place where it shows best.
     pub detectable: Vec<Detectable>,
     /// Simulations of a recording.
     pub simulations: u64,

@@ -29,7 +29,7 @@ pub(super) struct State<'s, 'a> {
     pub found: Vec<Candidate>,
     /// Single effects, what promises most first.
     pub singles: std::vec::IntoIter<Seed>,
-    /// Laws that bring one number more than the nominal model has.
+    /// Laws that have one parameter more than the nominal model.
     pub one_parameter: std::vec::IntoIter<Seed>,
     /// Effects at once.
     pub effects: usize,

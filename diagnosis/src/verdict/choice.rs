@@ -22,7 +22,7 @@ pub fn chosen(search: &Search) -> &Candidate {
         let so_many = || search.found.iter().filter(|c| c.structure.added.len() == effects && is_plausible(c));
         let Some(next) = so_many().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)) else { continue };
         let next = so_many().fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
-        // Ties go to the fewest parameters, then to the physics that is named first.
+        // Ties go to the fewest parameters, then to the effect that is named first.
         let simplest = so_many()
             .filter(|c| evidence(search, c, next) < tuning().claim.alike || is_enough(search, c, next))
             .min_by_key(|c| (c.structure.free.len(), c.structure.added.iter().map(order).sum::<usize>()))
@@ -197,7 +197,7 @@ fn is_finer_than(simple: &Candidate, rich: &Candidate) -> bool {
     }
 }
 
-/// A law with more numbers that fits as well as the one that is claimed.
+/// A law with more parameters that fits as well as the one that is claimed.
 pub(super) struct Richer<'s> {
     pub candidate: &'s Candidate,
     /// Whether the one that is claimed is a special or limiting case of it, in the same place.

@@ -55,7 +55,7 @@ pub(super) enum Doubt {
     WorseThanRefit,
     /// The model as given simulates the motion of held-out recordings better.
     WorseSimulated,
-    /// A number is at an end of what the fit may try.
+    /// A parameter is at an end of what the fit may try.
     AtAnEnd,
 }
 

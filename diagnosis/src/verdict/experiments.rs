@@ -53,8 +53,8 @@ fn planned<'a, 's>(
         }
     }
     if decision.word == Word::Missing || inseparable.is_some() {
-        // Of laws that contain one another the simpler is claimed as long as nothing speaks against it, and the experiment is to rule the richer one out; a law of more
-        // numbers that is another explanation leaves it open.
+        // Of laws that contain one another the simpler is claimed as long as there is no evidence against it, and the experiment is to rule the richer one
+        // out. A law of more parameters that is another explanation leaves it open.
         let (contained, others): (Vec<_>, Vec<_>) = richer(search, best).into_iter().partition(|rival| rival.contains);
         for rival in others.into_iter().chain(contained) {
             if let Ok(plan) = confirm(problem, [best, rival.candidate], rival.contains, &search.noise_sd, budget) {

@@ -1,4 +1,4 @@
-//! What was found: each physics with its place, its parameters, and what else could stand there.
+//! What was found: each effect with its place, its parameters, and its alternatives.
 
 use super::choice::{behind, chosen, evidence, exchanged};
 use super::confidence::{Figures, figures, probability, probability_of_family, without};
@@ -15,7 +15,7 @@ use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
 
-/// Each physics of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
+/// Each effect of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
 /// and not among them.
 pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
     let is_companion = |which: usize| {
@@ -36,7 +36,7 @@ pub(super) fn is_timing_of(problem: &Problem, best: &Candidate, which: usize) ->
     best.structure.added.get(which).zip(values.get(which)).is_some_and(|(hypothesis, values)| is_timing(hypothesis, values, period))
 }
 
-/// The figures of every finding of a search, for those who calibrate its confidence: physics, place, figures.
+/// The figures of every finding of a search, for those who calibrate its confidence: effect, place, figures.
 pub fn figures_of(search: &Search) -> Vec<(String, String, Figures)> {
     let best = chosen(search);
     let one = |(which, h): (usize, &Hypothesis)| {
@@ -133,7 +133,7 @@ fn rivals<'s>(search: &'s Search, best: &Candidate, which: usize) -> Vec<(Hypoth
         }
     }
     found.sort_by(|a, b| a.2.total_cmp(&b.2));
-    // However finely a law is resolved, it is one physics.
+    // However finely a law is resolved, it is one effect.
     let same = |a: &Hypothesis, b: &Hypothesis| a.physics == b.physics && a.place.same(&b.place);
     let mut each: Vec<(Hypothesis, &Candidate, f64)> = Vec::new();
     for (rival, candidate, behind) in found {
@@ -189,7 +189,7 @@ pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -
     all
 }
 
-/// What would have been seen: for each physics the smallest size at the place where it shows best.
+/// What would have been seen: for each effect the smallest size at the place where it shows best.
 pub(super) fn detectable(search: &Search) -> Vec<Detectable> {
     let one = |d: &crate::search::Detectable| Detectable {
         physics: d.physics.to_string(),

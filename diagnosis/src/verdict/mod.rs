@@ -161,7 +161,7 @@ fn is_worse_simulated(problem: &Problem, decision: &decision::Decision) -> bool 
     }
 }
 
-/// Whether a number of the nominal model, or the size of an effect, is at an end of what the fit may try.
+/// Whether a parameter of the nominal model, or the size of an effect, is at an end of what the fit may try.
 fn is_at_an_end(best: &Candidate) -> bool {
     let stated = best.structure.free.iter().zip(&best.fit.values).filter(|(number, _)| matches!(number.role, Role::Stated(_)));
     stated.into_iter().any(|(number, value)| number.at_bound(*value).is_some()) || !plausible::is_plausible(best)
