@@ -12,7 +12,7 @@ pub const SHOWS: f64 = 3.0;
 /// What a user has without a diagnosis: the honest measure of a canceller is its stable gain over the best of these.
 const OTHERS: [&str; 3] = ["none", "second order", "linear, refitted"];
 
-/// Kinds of physics, by the names of the hidden laws.
+/// Kinds of effects, by the names of the hidden laws.
 pub const KINDS: [(&str, &[&str]); 3] = [
     ("dry friction", &["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "load_friction", "warm_friction", "gear_loss"]),
     ("hysteresis", &["hysteretic_spring", "bouc_wen", "dahl", "lugre", "maxwell_slip", "preisach_lugre", "bristle_field"]),
@@ -26,7 +26,7 @@ pub struct Case {
     pub name: String,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
-    /// Whether the nominal numbers were refitted to a session of the hidden plant first.
+    /// Whether the nominal parameters were refitted to a session of the hidden plant first.
     pub refitted: bool,
     /// SHA-256 of the truth, as printed before anything was recorded.
     pub sealed: String,
@@ -44,7 +44,7 @@ pub struct Case {
     pub nonlinear: bool,
     /// Error on held-out data, as shares of their deviation: as given, refitted, diagnosed.
     pub held_out: [Option<f64>; 3],
-    /// The refitted one of these over the noise floor: how far the recordings are from what the nominal model with other numbers can do.
+    /// The refitted one of these over the noise floor: how far the recordings are from any prediction of the nominal model with other parameters.
     pub refit_floors: Option<f64>,
     /// Stable mu*lambda by canceller and grip.
     pub gains: Vec<Gain>,
@@ -85,7 +85,7 @@ impl Case {
         hands
     }
 
-    /// What kind of physics is concealed first: dry friction, hysteresis, backlash, something else; `None` where nothing is.
+    /// What kind of effect is concealed first: dry friction, hysteresis, backlash, something else; `None` where nothing is.
     pub fn kind(&self) -> Option<&'static str> {
         let name = self.concealed.first()?.split(' ').next()?;
         let kind = KINDS.iter().find(|(_, names)| names.contains(&name));

@@ -31,7 +31,7 @@ pub struct Draw {
     pub effects: usize,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
-    /// Whether the nominal numbers are refitted to a session of the hidden plant first.
+    /// Whether the nominal parameters are refitted to a session of the hidden plant first.
     pub refitted: bool,
 }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A finding of a verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Name of the physics.
+    /// Name of the effect.
     pub physics: String,
     /// Bodies, or a signal.
     pub place: Vec<String>,
@@ -56,7 +56,7 @@ fn sits_at(finding: &Finding, site: &Site) -> bool {
 pub struct Handed {
     /// Whether nobody measured the hand.
     pub hand_hidden: bool,
-    /// Whether the nominal numbers had been refitted before.
+    /// Whether the nominal parameters had been refitted before.
     pub refitted: bool,
 }
 

@@ -46,7 +46,7 @@ pub struct Summary {
     pub live: Share,
     /// What was concealed, what was said first, how often. `nothing` stands for no effect and no finding.
     pub confusion: Vec<(String, String, usize)>,
-    /// What cancellers are worth, by what is concealed: each kind of physics, then all that is nonlinear and all that is linear.
+    /// What cancellers are worth, by what is concealed: each kind of effect, then all that is nonlinear and all that is linear.
     pub worth: Vec<Group>,
 }
 
