@@ -133,7 +133,7 @@ pub struct Set {
     pub fit: Vec<String>,
     /// And of those that no fit sees.
     pub held_out: Vec<String>,
-    /// Per file, what is another number there than in the model: path and value.
+    /// Per file, the parameters that differ from the model there: path and value.
     conditions: Vec<(String, Vec<(String, f64)>)>,
 }
 
@@ -144,10 +144,10 @@ impl Set {
         Set { folder, model, columns, fit: Vec::new(), held_out: Vec::new(), conditions: Vec::new() }
     }
 
-    /// Adds an experiment's recording. It must be of the set's device, in which single numbers may differ.
+    /// Adds an experiment's recording. It must be of the set's device, in which single parameters may differ.
     ///
     /// # Errors
-    /// More than single numbers differ.
+    /// More than single parameters differ.
     pub fn add(&mut self, experiment: &Experiment, device: &Device) -> Result<(), String> {
         let file = format!("{}.mcap", experiment.name);
         let conditions = differences(&self.model, &device.model).filter(|_| self.columns == device.columns);
@@ -180,7 +180,7 @@ impl Set {
     }
 }
 
-/// Numbers of bodies and elements that `other` has in place of `model`'s; `None` where more than single numbers differ.
+/// Parameters of bodies and elements that `other` has instead of `model`'s; `None` where more than single parameters differ.
 fn differences(model: &Model, other: &Model) -> Option<Vec<(String, f64)>> {
     let mut alike = model.clone();
     let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! Numbers to start from: inertia, damping and stiffness of one body, from what drives it and what it does.
+//! Parameters to start from: inertia, damping and stiffness of one body, from what drives it and what it does.
 //!
 //! The equation of motion f = m x'' + b x' + k x + c is multiplied by a bump g that vanishes at both ends together with its slope.
 //! Integration by parts gives
@@ -55,7 +55,7 @@ pub fn estimate(shown: &[Shown], with_spring: bool) -> Option<Numbers> {
     Some(Numbers { damping, ..best })
 }
 
-/// Share of the force that remains unexplained, and the numbers.
+/// Share of the force that remains unexplained, and the parameters.
 fn at_width(shown: &[Shown], width: usize, with_spring: bool) -> Option<(f64, Numbers)> {
     let unknowns = if with_spring { 4 } else { 3 };
     let (mut rows, mut right) = (Vec::new(), Vec::new());
