@@ -1,4 +1,4 @@
-//! The force that gave the physics away, the law over it, and the places that compete.
+//! The force that revealed the effect, the law over it, and the places that compete.
 
 use super::phrases::adds;
 use crate::parts::{file_name, sentence};
@@ -43,7 +43,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     places(page, found, location);
 }
 
-/// A finding's physics and place in words, as a title.
+/// A finding's effect and place in words, as a title.
 pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
     sentence(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
@@ -234,7 +234,7 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
     at..at + size
 }
 
-/// The force at the place that explains most, where no physics was named.
+/// The force at the place that explains most, where no effect was named.
 fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
     let motion = found.problem.model.motion;
     let unit = if matches!(place.place, Place::Between(..)) { unit_for(motion, "N") } else { String::new() };

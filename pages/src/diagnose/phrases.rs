@@ -4,7 +4,7 @@ use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::verdict::Word;
 use backdrive_report::Tone;
 
-/// Whether a candidate adds any physics.
+/// Whether a candidate adds any effect.
 pub(super) fn adds(candidate: &Candidate) -> bool {
     !candidate.structure.added.is_empty()
 }
