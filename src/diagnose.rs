@@ -1,4 +1,4 @@
-//! `backdrive diagnose`: which physics a model leaves out, by recordings of its device.
+//! `backdrive diagnose`: which effects a model lacks, by recordings of its device.
 
 use crate::cli;
 use crate::diagnose_text::text;

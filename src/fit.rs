@@ -72,7 +72,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     }
     let patience = Duration::from_secs_f64(options.patience);
     let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-    // With every physics withheld a search is the refit of the nominal model alone.
+    // With every effect withheld a search is the refit of the nominal model alone.
     let settings = Settings { without, effort: options.effort, patience, ..Settings::default() };
     let limit = settings.limit(Some(&stop));
     let fitted = progress::about(settings.expected(), |report| fitted(&problem, &settings, limit, report))?;
@@ -113,7 +113,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     Ok(if disagree { code::NEGATIVE } else { 0 })
 }
 
-/// What to do with the numbers, the most useful first.
+/// What to do with the parameters, the most useful first.
 fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
     let mut steps = Vec::new();
     let agree = fitted.per_record.disagreements().is_empty();

@@ -103,7 +103,7 @@ fn written(
     Ok(json!({ "recording": file, "out": out, "samples": samples, "joints": errors }))
 }
 
-/// Refits the numbers that the model states of each joint, its physics as they are.
+/// Refits the parameters that the model states of each joint, its structure unchanged.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let (mut set, told) = open::set_of(&options.set)?;
     let mut notes = Vec::new();

@@ -244,7 +244,7 @@ mod tests {
     use backdrive_nodes::protocol::NodeStatus;
     use backdrive_nodes::stage::Clock;
 
-    /// A run at 5 kHz of 20 000 steps in which nodes missed so many deadlines.
+    /// A run at 5 kHz of 20 000 steps in which each node missed the given number of deadlines.
     fn report(missed: &[(&str, u64)]) -> RunReport {
         let node = |(name, missed): &(&str, u64)| NodeReport {
             with: Vec::new(),
