@@ -307,7 +307,7 @@ fn open_configurations() -> Vec<Configuration> {
     order.into_iter().map(|i| all[i].clone()).collect()
 }
 
-/// A master's file with numbers changed, in a folder that lasts as long as the study.
+/// A master's file with changed parameters, in a folder that lasts as long as the study.
 fn changed(folder: &Path, base: &str, name: &str, changes: &[(&str, f64)], more: &str) -> PathBuf {
     let text = std::fs::read_to_string(file(&format!("plant/models/{base}.toml"))).expect("the model is there") + more;
     let mut model = Model::from_toml(&text, name).expect("the model is whole");
