@@ -1,5 +1,5 @@
-//! Derivatives of the residuals by the parameters of a fit: carried along with the motion (forward mode) where a parameter is one of a nonlinear model's
-//! bodies or elements, else by differences of simulations; in parallel.
+//! Derivatives of the residuals by the parameters of a fit, in parallel. They are integrated along with the motion (forward mode) where a parameter is one
+//! of a nonlinear model's bodies or elements, else computed by differences of simulations.
 
 use crate::evaluator::{Evaluator, residuals_in};
 use crate::structure::{FreeParameter, Role, Structure};
@@ -158,8 +158,8 @@ impl Evaluator<'_> {
         Some((values.clone(), structure.model(self.problem, &values)?, step))
     }
 
-    /// Derivatives by the weights of unknown inputs (Curtis, Powell & Reid 1974): the effect of a weight is over when the next that is moved along
-    /// with it begins, but for what the device never forgets.
+    /// Derivatives by the weights of unknown inputs (Curtis, Powell & Reid 1974). The effect of a weight is over when the next one that is moved with it
+    /// begins, except for what the device never forgets.
     fn knots(
         &self,
         structure: &Structure,

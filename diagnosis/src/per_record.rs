@@ -1,5 +1,5 @@
-//! The same structure fitted to each record by itself: parameters that differ from record to record by more than their errors are the sign
-//! of a wrong structure, for a device has one set of parameters.
+//! The same structure fitted to each record by itself. A device has one set of parameters, so parameters that differ from record to record by more than
+//! their errors indicate a wrong structure.
 
 use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;

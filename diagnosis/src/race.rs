@@ -187,8 +187,8 @@ impl Course<'_> {
         running.extend(rest);
     }
 
-    /// A start of a law that replaces elements of the model, with their parameters as a fit has them: the law's own starts have those of an early refit, far
-    /// from which another effect may have led.
+    /// A start of a law that replaces elements of the model, with their parameters from a fit. The law's own starts have those of an early refit, and
+    /// another effect may have moved the parameters far from these.
     pub(crate) fn with_replaced(&self, (structure, values): (&Structure, &[f64]), law: &Hypothesis, start: Vec<f64>) -> Vec<f64> {
         let problem = self.evaluator.problem;
         let of_replaced = |path: &str| law.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}.")));

@@ -1,5 +1,5 @@
-//! What is claimed and what is not: errors that are no effect of the device, parameters that a refit has to find, and a law that is there although more
-//! remains.
+//! What is claimed and what is not. Covers errors that are no effect of the device, parameters that a refit has to find, and a law that is there although
+//! more remains.
 
 use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::error_budget::Source;

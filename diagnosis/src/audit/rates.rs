@@ -62,8 +62,8 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
     })
 }
 
-/// Smallest share of an output's variance that the scaled prediction of the nominal model does not explain when the samples are taken at this period; of
-/// differences over a lag where no spring holds the position.
+/// Smallest share of an output's variance that the scaled prediction of the nominal model does not explain when the samples are taken at this period. Where
+/// no spring holds the position, the variance is that of differences over a lag.
 fn unexplained_variance(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
     let mut record = record.clone();
     (record.period, record.logged) = (period, None);

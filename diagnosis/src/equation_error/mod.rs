@@ -1,7 +1,7 @@
 //! Laws looked at on forces along a measured motion.
 //!
-//! Where the motion of a body and the force that it takes are both known, the force of a law along that motion is known without a simulation of the rest. So every law,
-//! and every pair, is held against the force in a band in which the motion is resolved, and judged by what it predicts of stretches that were left out.
+//! Where the motion of a body and the force on it are both known, the force of a law along that motion is known without a simulation of the rest. So every
+//! law, and every pair, is compared with the force in a band in which the motion is resolved. It is judged by its prediction of held-out stretches.
 
 mod band;
 mod belief;

@@ -149,8 +149,8 @@ impl<'a> Rival<'a> {
         Some(least)
     }
 
-    /// The same by a true refit to the recordings and to what `other` predicts for the experiment: what the cost then is above its own
-    /// on the recordings alone, in noise variances.
+    /// The same by a true refit to the recordings and to the prediction of `other` for the experiment. The result is the increase of the cost over that on
+    /// the recordings alone, in noise variances.
     pub(super) fn refit(&self, setup: &Setup, trial: &Trial, other: &Rival) -> Option<f64> {
         let columns = setup.outputs_of(&other.as_fitted(setup.problem)?, trial)?;
         let mut record = trial.record.clone();

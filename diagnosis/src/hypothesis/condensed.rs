@@ -1,6 +1,6 @@
 //! Where a fit of a joint with a body in it starts. A model without that body has already made the joint as soft, and its ends as heavy, as both springs
-//! and the body together look from outside (static condensation: Guyan 1965). Beside what it absorbed, the body would count twice; so a start takes that
-//! back: the joint's own spring is stiffer, the ends are lighter, and slow motion is as before.
+//! and the body together look from outside (static condensation: Guyan 1965). With these absorbed values the body would count twice. So a start
+//! re-initialises them: the joint's own spring is stiffer, the ends are lighter, and slow motion is the same as before.
 
 use super::types::{Form, Hypothesis};
 use crate::physics::physics_named;

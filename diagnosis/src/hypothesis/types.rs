@@ -346,7 +346,8 @@ pub(super) enum Form {
     Inertia { body: String },
     /// Adds a body behind the elements of a joint, and a spring and a damper from it to the joint's other end.
     Series { joint: [String; 2], body: String, spring: String, damper: String },
-    /// Hangs a free body on another by an element of this kind, whose parameters but the last are those of the kind in the hypothesis' order; the last is the body's inertia.
+    /// Hangs a free body on another by an element of this kind. The last parameter of the hypothesis is the body's inertia; the others are those of the
+    /// kind, in the hypothesis' order.
     Hung { on: String, body: String, element: String, kind: &'static Kind },
 }
 

@@ -1,5 +1,5 @@
-//! The laws that a force may follow: it is regressed on everything that moves at its place, and each law is tested on parts of the recordings that it
-//! was not fitted to.
+//! The laws that a force may follow. The force is regressed on everything that moves at its place, and each law is tested on held-out parts of the
+//! recordings.
 
 use super::law::{Form, Law, Point, Variable};
 use super::period::{Ripple, least_squares};

@@ -199,8 +199,8 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Edits of the model that was turned round, as those of the model as its file has it. A motion that is ahead of its recording is a force that acts late; the
-    /// other way round no model of a device that is driven by forces can have it.
+    /// Edits of the inverted model, converted to edits of the model in its file. A motion that is ahead of its recording is a force that acts late. The
+    /// opposite case cannot occur in a model of a device that is driven by forces.
     pub fn in_file(&self, edits: Vec<Edit>) -> Vec<Edit> {
         let delay = format!("inputs.{}.delay", self.motion);
         let one = |edit: Edit| match edit {

@@ -30,8 +30,8 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
     }
 }
 
-/// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
-/// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
+/// Fits those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that compensate the
+/// integration error of few substeps. So it is judged, and continued, with as many substeps as the model asks for, even where the time is up.
 pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], nominal: &Candidate, work: &Work) {
     let samples = nominal.fit.residuals.len();
     let exact_end = work.share(tuning().search.best_end).max(work.budget.spent() + work.share(tuning().search.refitted));
@@ -173,8 +173,8 @@ pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f6
     fitted.map(|(structure, fit)| candidate(evaluator, structure.clone(), fit)).collect()
 }
 
-/// The best with each of its effects left out, where there is more than one, or as a simpler law that it contains, and where to start: from where all
-/// else is.
+/// The best with each of its effects left out, where there is more than one, or replaced by a simpler law that it contains. Also where to start: from the
+/// present values of all other parameters.
 fn fewer(course: &Course, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
     let problem = course.evaluator.problem;
     let Some(best) = found.first() else { return Vec::new() };

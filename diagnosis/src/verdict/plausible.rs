@@ -5,8 +5,8 @@ use crate::hypothesis::{Family, Hypothesis, Parameter};
 use crate::structure::{FreeParameter, Role};
 use crate::tuning::tuning;
 
-/// Whether every effect that a structure adds has plausible parameters: inside the documented range of the effect, its size not at the end of what the fit
-/// may try, and surely not nothing.
+/// Whether every effect that a structure adds has plausible parameters, inside the documented range of the effect. Its size must not be at the end of what
+/// the fit may try, and must surely differ from nothing.
 pub(super) fn is_plausible(candidate: &Candidate) -> bool {
     added(candidate).all(|(hypothesis, parameter, number, value)| {
         let range = hypothesis.physics.facts.plausible.iter().find(|(key, _, _)| *key == parameter.key);

@@ -7,8 +7,8 @@ use crate::physics;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 
-/// A law that wins with more parameters has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
-/// short, the first that came near may not be the one.
+/// A law that wins with more parameters must be better than its simpler relatives, whatever their screening value. Far from the noise, where fits were cut
+/// short, the first that came near may not be the right one.
 pub(crate) struct Relatives;
 
 impl Step for Relatives {
