@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Range of the search for critical gains: to 50, coarser than `stability` does, for there are many. With the grip of the session, where the live graph is
-/// asked too, the loop is also examined about the critical gain, since noise and dry friction make verdicts flicker there.
+/// Range of the search for critical gains: to 50, coarser than `stability` does, for there are many. With the grip of the session the live graph is asked
+/// too. There the loop is also examined about the critical gain, since noise and dry friction make verdicts flicker there.
 const SEARCH: Search =
     Search { lowest: 0.05, floor: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
 
