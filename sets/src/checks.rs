@@ -29,8 +29,8 @@ pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
     Ok(notes)
 }
 
-/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into: the samples
-/// that the model takes are the same, bit for bit.
+/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into. The test is that the
+/// samples that the model takes are the same, bit for bit.
 pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
     let moves = |record: &Record| record.inputs.iter().chain(record.outputs.iter().flatten()).any(|s| s.iter().any(|x| *x != s[0]));
     let same = |a: &Record, b: &Record| a.inputs == b.inputs && a.outputs == b.outputs && moves(a);
