@@ -1,6 +1,7 @@
-//! Tells the program which commit it was built from, for `--version`.
+//! Passes to the program the commit it was built from, for `--version`.
 //!
-//! `BACKDRIVE_COMMIT` says it where there is no git (a container, a package's build); otherwise git is asked. A source without either has its version alone.
+//! `BACKDRIVE_COMMIT` states it where there is no git (a container, a package's build); otherwise git is asked. A source without either has its version
+//! alone.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,7 +23,7 @@ fn is_ours(top: &str) -> bool {
 fn watched() -> Vec<String> {
     let mut names = vec!["HEAD".to_string(), "packed-refs".to_string(), "logs/HEAD".to_string()];
     names.extend(git(&["symbolic-ref", "--quiet", "HEAD"]));
-    // A file that is not there would have cargo build this anew every time.
+    // A file that is not there would have cargo rebuild this every time.
     names.iter().filter_map(|name| git(&["rev-parse", "--git-path", name])).filter(|path| Path::new(path).exists()).collect()
 }
 

@@ -2,9 +2,9 @@
 //!
 //!     cargo bench --bench loop
 //!
-//! Prints simulated seconds per second, by the wall clock and by the time that this process had the core (medians of 10
-//! runs; on a shared machine the second is the loop's own speed), for several numbers of substeps, and beside each how far
-//! halving the step moves any output, as a share of that output's range, up to the end of the sustained push.
+//! Prints simulated seconds per second for several numbers of substeps (medians of 10 runs): by the wall clock, and by the CPU time of this process. On a
+//! shared machine the CPU time gives the speed of the loop. Beside each value it prints the largest change of any output when the step is halved. The
+//! change is a share of that output's range, up to the end of the sustained push.
 
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;

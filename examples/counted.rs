@@ -76,7 +76,7 @@ fn simulated(count: usize) -> f64 {
     outputs.iter().flatten().filter(|y| y.is_finite()).sum()
 }
 
-/// A fit of all numbers of the ball screw to one second of it with a third more viscous friction: its Gauss-Newton steps, to the end.
+/// A fit of all parameters of the ball screw to one second of it with a third more viscous friction: its Gauss-Newton steps, to the end.
 fn fit(count: usize) -> f64 {
     let text = std::fs::read_to_string(at("plant/models/ball-screw.toml")).expect("part of the workspace");
     let model = Model::from_toml(&text, "ball-screw").expect("a model");

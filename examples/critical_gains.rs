@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example critical_gains
 //!
-//! Sensors are ideal and the devices' limits do not act: with them most of the range is `limited`, which says nothing of the loop.
+//! Sensors are ideal and the devices' limits do not act: with them the outcome is `limited` in most of the range, which is no information on the loop.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -111,7 +111,7 @@ fn main() {
     show("sixth order, exact", critical(|l| tried(&|graph| cancel_with(graph, |_| {}), l)));
 }
 
-/// The second-order canceller whose edge is highest: pattern search in the logarithms of mass, damping, stiffness.
+/// The second-order canceller with the highest critical gain: pattern search in the logarithms of mass, damping, stiffness.
 fn best_second_order(what: &str, start: &Graph, outcome: impl Fn(&Graph, f64) -> Outcome) -> Graph {
     let numbers = ["bodies.handle", "elements.damping.damping", "elements.spring.stiffness"];
     let with_numbers = |values: &[f64; 3]| {
@@ -126,7 +126,7 @@ fn best_second_order(what: &str, start: &Graph, outcome: impl Fn(&Graph, f64) ->
         }
         graph
     };
-    // A coarser search for the edge than the table's: only the order of candidates matters.
+    // A coarser search for the critical gain than the table's: only the order of candidates matters.
     let edge = |values: &[f64; 3]| {
         let graph = with_numbers(values);
         let gains = (0..).map(|i| 0.2 * 1.05_f64.powi(i)).take_while(|g| *g < HIGHEST);

@@ -8,9 +8,9 @@
 //! `launch/contact-hosts.toml` in real time, judged by its own bag. The prediction takes graph and hand from the bag of the
 //! clean run and imposes delay and loss on the two connections that cross the network.
 //!
-//! The hand pushes harder than in the launch file. Dry friction lets this loop rest or oscillate at the same gain, whichever it is thrown
-//! into: on one host without a canceller the launch file's impact starts the oscillation from 1.15 on, one at half its speed not below 1.8,
-//! and all of twice its speed and more from 0.85 on. There it is the loop that decides, and not what a late sample does to the impact.
+//! The hand pushes harder than in the launch file. Because of dry friction this loop can either rest or oscillate at the same gain, depending on its start.
+//! On one host without a canceller, the launch file's impact starts the oscillation from 1.15 on. An impact at half its speed does not start it below 1.8,
+//! and all impacts at twice its speed and more start it from 0.85 on. With the harder push the loop decides, not the effect of a late sample on the impact.
 
 #[path = "../tests/netns/mod.rs"]
 mod netns;
@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::sync::atomic::AtomicBool;
 
-/// Gains between which the edge is looked for, and how finely: a factor.
+/// Range of gains in which the critical gain is searched, and the resolution: a factor.
 const LOWEST: f64 = 0.1;
 const HIGHEST: f64 = 12.8;
 const FINE: f64 = 1.3;
@@ -89,7 +89,7 @@ fn pushed(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     Ok(path)
 }
 
-/// Runs the graph on both hosts; what the desk says of it.
+/// Runs the graph on both hosts; returns the result of the desk host.
 fn run(hosts: &Hosts, task: &Task, bag: &Path, more: &[&str]) -> Result<Value, Box<dyn Error>> {
     let start = |host: usize| {
         let mut command = hosts.on(host, &task.program);
@@ -132,7 +132,7 @@ fn live_edge(hosts: &Hosts, task: &Task, canceller: &[&str]) -> Result<String, B
     Ok(format!("{low:.2}..{high:.2}"))
 }
 
-/// The edge of the recorded graph with this delay and loss on what crosses the network.
+/// The critical gain of the recorded graph with this delay and loss on what crosses the network.
 fn predicted_edge(bag: &Path, delay_s: f64, loss: f64, without: bool) -> Result<String, Box<dyn Error>> {
     let reader = Reader::open(bag)?;
     let header = reader.header().ok_or("the bag has no header")?;

@@ -1,14 +1,15 @@
 //! A ROS 2 node in a few lines, over the transport of the graphs: it listens, speaks, asks or echoes on one topic.
 //!
-//!   ros2_peer listen TOPIC[:KIND] ...     until nothing has come for 2 s: how many messages of each, the first and last number, how many late
-//!   ros2_peer speak TOPIC COUNT HZ        sends samples once somebody listens
-//!   ros2_peer push TOPIC EFFORT HZ SECONDS   sends a force at once, whoever listens, as a stranger would
-//!   ros2_peer ping COUNT HZ               sends on /ping, hears /pong: one way and round trip, median and 99th percentile
-//!   ros2_peer echo                        sends what it hears on /ping back on /pong, until nobody speaks any more
+//!   ros2_peer listen TOPIC[:KIND] ...     until nothing has come for 2 s: how many messages of each, the first and last number, how many late.
+//!   ros2_peer speak TOPIC COUNT HZ        sends samples once somebody listens.
+//!   ros2_peer push TOPIC EFFORT HZ SECONDS   sends a force at once, whoever listens, as a stranger would.
+//!   ros2_peer ping COUNT HZ               sends on /ping, hears /pong: one way and round trip, median and 99th percentile.
+//!   ros2_peer echo                        sends what it hears on /ping back on /pong, until nobody speaks any more.
 //!
 //!   ros2_peer as FILE ...                 the same as a node of the run whose `identity.json` this is: it tags what it sends, and hears that run alone
 //!
-//! KIND is sample (where nothing is said), gains, status, margin or event. One way is told in the clock of one machine: both ends must share it, as network namespaces do.
+//! KIND is sample (the default), gains, status, margin or event. The one-way time is measured in the clock of one machine: both ends must share it, as
+//! network namespaces do.
 
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Message, Sample};
@@ -144,7 +145,7 @@ fn ping(ros2: &mut Ros2, count: u64, hz: f64) -> Result<(), TransportError> {
             match subscriber.receive()? {
                 Some(m) if m.sequence() == i => {
                     round.push(now_ns() - sent);
-                    // The echo says when it heard.
+                    // The echo states when it heard.
                     there.push(m.stamp_ns() - sent);
                     break;
                 }

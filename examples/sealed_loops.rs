@@ -2,9 +2,9 @@
 //!
 //!     cargo run --release --example sealed_loops -- --seed 1 --count 100
 //!
-//! A case is a loop that is stable, and one thing in it that makes it shake and that its graph does not tell: more gain, a delay, another hand,
-//! a wrong sensor, physics in the master (which the hidden plant of `backdrive-sealed` moves, not the plant of this program). The bag holds
-//! the graph without that thing. What is asked sees the bag alone. Every fifth case hides nothing.
+//! A case is a loop that is stable, and one fault that makes it oscillate and that its graph does not contain. The fault is more gain, a delay, another
+//! hand, a wrong sensor, or an effect in the master. That effect is in the hidden plant of `backdrive-sealed`, not in the plant of this program. The bag
+//! holds the graph without the fault, and the analysis sees the bag alone. Every fifth case hides nothing.
 
 use backdrive_bags::{Reader, Recorder};
 use backdrive_launch::join::{recorder_options, recording};
@@ -138,7 +138,7 @@ fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<Case
     let hand = hand_of(&base.graph);
     let edge = |trial: &Trial| trial.edge(&hand, 1.0, &NEVER).ok().and_then(|e| e.critical_gain.or(Some(20.0)));
     let base_edge = edge(&base)?;
-    // Well below the edge that the loop has without the fault.
+    // Well below the critical gain that the loop has without the fault.
     let lambda = match kind {
         "gain" | "canceller" => base_edge * between(1.3, 4.0),
         _ => base_edge * between(0.15, 0.6),

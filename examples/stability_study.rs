@@ -1,4 +1,4 @@
-//! `backdrive stability` against the live graph: how far is the predicted edge from the real one?
+//! `backdrive stability` against the live graph: how far is the predicted critical gain from the real one?
 //!
 //!     cargo run --release --example stability_study            # 40 configurations, and 20 with a concealed difference
 //!     cargo run --release --example stability_study -- --check # the same; fails where a bound is missed
@@ -6,10 +6,10 @@
 //!                                                              # on a share is lower by two standard deviations of a share of so few
 //!     cargo run --release --example stability_study -- --concealed # only the 20
 //!
-//! Each configuration is a loop (master, grip, environment, canceller, delay) whose edge is found by bisection on the running
-//! graph. A bag is recorded at 0.3 to 0.5 of that edge, with a dither of three amplitudes, and `stability` is asked from the bag
-//! alone. The running graph is then run at 0.7, 0.9, 1.1 and 1.4 of the predicted edge. In the concealed configurations the
-//! master (or the delay) that makes the bag is not the one whose model the bag holds.
+//! Each configuration is a loop (master, grip, environment, canceller, delay) whose critical gain is found by bisection on the running graph. A bag is
+//! recorded at 0.3 to 0.5 of that gain, with a dither of three amplitudes, and `stability` is asked from the bag alone. The running graph is then run at
+//! 0.7, 0.9, 1.1 and 1.4 of the predicted critical gain. In the concealed configurations the master (or the delay) that makes the bag is not the one whose
+//! model the bag holds.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -98,7 +98,7 @@ impl Configuration {
     }
 }
 
-/// Runs a graph in this process as a live run is run, and says what it did.
+/// Runs a graph in this process as a live run is run, and returns its outcome.
 fn live(graph: &Graph) -> Outcome {
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name).expect("it builds"));
     let mut sequence = Sequence::new(plans.collect(), &graph.timing).expect("it runs");
@@ -133,7 +133,7 @@ fn live_edge(graph: &Graph) -> Option<f64> {
                 if at(graph, middle) == Outcome::Stable { low = middle } else { high = middle }
             }
             let edge = (low * high).sqrt();
-            // Near the edge the verdict may change more than once: the lowest gain that is not stable counts.
+            // Near the stability limit the verdict may change more than once: the lowest gain that is not stable counts.
             let around = [0.88, 0.91, 0.94, 0.96, 0.98].map(|f| f * edge);
             return Some(around.into_iter().find(|g| at(graph, *g) != Outcome::Stable).unwrap_or(edge));
         }
@@ -187,7 +187,7 @@ fn ask(bag: &Path, gain: f64) -> (Answer, Session) {
     (found, session)
 }
 
-/// The largest dither that neither loses contact while the hand holds still nor drives the loop over its edge, recorded.
+/// The largest dither that neither loses contact while the hand holds still nor drives the loop over its stability limit, recorded.
 fn record_excited(real: &Configuration, told: &Configuration, gain: f64, folder: &Path) -> (PathBuf, f64) {
     let bag = folder.join("bag.mcap");
     for peak in [3.0, 1.5, 0.8, 0.4, 0.2, 0.1, 0.05] {
@@ -216,7 +216,7 @@ struct Row {
     concealed: bool,
     live: f64,
     found: Answer,
-    /// Gain over the predicted edge, predicted word, live outcome.
+    /// Gain over the predicted critical gain, predicted word, live outcome.
     trials: Vec<(f64, bool, bool)>,
     peak: f64,
 }
@@ -307,7 +307,7 @@ fn open_configurations() -> Vec<Configuration> {
     order.into_iter().map(|i| all[i].clone()).collect()
 }
 
-/// A master's file with numbers changed, in a folder that lasts as long as the study.
+/// A master's file with changed parameters, in a folder that lasts as long as the study.
 fn changed(folder: &Path, base: &str, name: &str, changes: &[(&str, f64)], more: &str) -> PathBuf {
     let text = std::fs::read_to_string(file(&format!("plant/models/{base}.toml"))).expect("the model is there") + more;
     let mut model = Model::from_toml(&text, name).expect("the model is whole");

@@ -2,7 +2,7 @@
 //!
 //!     cargo run --example verdict_schema
 //!
-//! `tests/verdict_schema.rs` says so where the file is not what the types say.
+//! `tests/verdict_schema.rs` fails where the file differs from the schema of the types.
 
 use std::error::Error;
 use std::path::Path;

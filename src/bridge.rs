@@ -1,8 +1,8 @@
 //! `backdrive bridge`: a local graph over shared memory, seen and joined over ROS 2.
 //!
-//! What a node of this host speaks is put on ROS 2, and nothing is taken from there: the bridge may be listened to. Asked for with `--both-ways`, what the
-//! graph's nodes on other hosts speak is taken from ROS 2 into shared memory, so that the nodes here need not know where the others are; only what is
-//! tagged by the run's own hosts.
+//! What a node of this host speaks is put on ROS 2, and nothing is taken from there: the bridge may be listened to. With `--both-ways`, what the graph's
+//! nodes on other hosts speak is also taken from ROS 2 into shared memory. The nodes here then need not know where the others are. Only what is tagged by
+//! the run's own hosts is taken.
 
 use crate::cli;
 use crate::failure::{Failure, code};

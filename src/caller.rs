@@ -1,4 +1,4 @@
-//! Who calls a verb in place of the command line: what a verb says is kept for them, and they read how far it is and may end it.
+//! Who calls a verb instead of the command line: the output of the verb is kept for them, and they can read its progress and end it.
 
 use std::cell::RefCell;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,7 @@ thread_local! {
     static CALLER: RefCell<Option<Arc<Caller>>> = const { RefCell::new(None) };
 }
 
-/// Who calls a verb: what it says is gathered here.
+/// Who calls a verb: its output is gathered here.
 #[derive(Debug, Default)]
 pub struct Caller {
     /// Set it to end the work early: a search ends with what it has, as after the first Ctrl-C on the command line.
@@ -46,7 +46,7 @@ impl Caller {
         *locked(&self.arguments) = arguments;
     }
 
-    /// Tells how far the work is.
+    /// Publishes the progress of the work.
     pub(crate) fn tell(&self, progress: Option<Progress>) {
         *locked(&self.progress) = progress;
     }

@@ -1,4 +1,4 @@
-//! `backdrive diagnose`: which physics a model leaves out, by recordings of its device.
+//! `backdrive diagnose`: which effects a model lacks, by recordings of its device.
 
 use crate::cli;
 use crate::diagnose_text::text;
@@ -30,7 +30,7 @@ mod servo;
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
 
-/// Diagnoses, writes, and says what was found.
+/// Diagnoses, writes, and prints what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     let beside = options.out.join(REPORT);
@@ -82,7 +82,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
 pub struct Diagnosed {
     /// Everything that was found.
     pub found: Diagnosis,
-    /// Names of the files in the folder that was given, and the path of a report that went elsewhere.
+    /// Names of the files in the folder that was given, and the path of a report that was written outside it.
     pub written: Vec<String>,
     /// What to do next with the commands that do it.
     pub steps: Vec<Step>,
@@ -100,7 +100,7 @@ pub fn diagnose_into(
     report: Option<&Path>,
     stop: &AtomicBool,
 ) -> Result<Diagnosed, Failure> {
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
     let files = opened.files;
@@ -149,7 +149,7 @@ fn shown(folder: &Path) -> String {
     if text.is_empty() { ".".to_string() } else { text }
 }
 
-/// By what the verdict says.
+/// By the word of the verdict.
 pub fn exit_code(word: Word) -> u8 {
     match word {
         Word::NothingMissing | Word::Parameters => 0,

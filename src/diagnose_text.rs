@@ -44,7 +44,7 @@ pub fn text(found: &Diagnosis) -> String {
     if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
         line("where", shows(place));
     }
-    // Where nothing was found all of it remains, and it is told above where it shows.
+    // Where nothing was found all of it remains, and it is reported above where it shows.
     if let Some(left) = verdict.remaining.as_ref().filter(|_| !verdict.findings.is_empty()).and_then(remains) {
         line("remains", left);
     }

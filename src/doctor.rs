@@ -6,7 +6,7 @@ use crate::{cli, output};
 use backdrive_launch::doctor::{Grade, Options, look};
 use std::time::Duration;
 
-/// Says what was found. Exit code 0 unless something is bad, then 5.
+/// Prints what was found. Exit code 0 unless something is bad, then 5.
 pub fn doctor(asked: &cli::Doctor) -> Result<u8, Failure> {
     let listen = Duration::try_from_secs_f64(asked.listen_s).unwrap_or_default();
     let findings = look(&Options { network: network(&asked.network)?, listen });

@@ -22,7 +22,7 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
     }
     let stem = options.graph.file_stem().map_or("experiments".into(), |s| s.to_string_lossy().to_string());
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from(stem));
-    // All are read before the first runs: what is wrong with the last is told now.
+    // All are read before the first runs: what is wrong with the last is reported now.
     let load = |e: &Experiment| {
         let folder = e.step.as_ref().map_or(out.clone(), |step| out.join(step));
         let changes = Overrides { bag: Some(folder.join(format!("{}.mcap", e.name))), ..changes.clone() };

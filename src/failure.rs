@@ -1,4 +1,4 @@
-//! Why a command fails, and the exit code that goes with it.
+//! Why a command fails, and its exit code.
 
 use backdrive_bags::BagError;
 use backdrive_inspect::InspectError;

@@ -1,4 +1,4 @@
-//! `backdrive fit`: a model's parameters refitted to recordings, its structure as it is.
+//! `backdrive fit`: a model's parameters refitted to recordings, its structure unchanged.
 
 use crate::cli;
 use crate::columns::columns;
@@ -33,7 +33,7 @@ use std::time::Duration;
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;
 
-/// What a fit says.
+/// The result of a fit.
 struct Fitted {
     rows: Vec<Row>,
     pairs: Vec<Pair>,
@@ -45,7 +45,7 @@ struct Fitted {
     model: String,
 }
 
-/// Fits, writes, and says how sure the numbers are.
+/// Fits, writes, and prints the confidence intervals of the parameters.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let model = Model::load(&options.model)?;
     if !model.servos.is_empty() {
@@ -72,7 +72,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     }
     let patience = Duration::from_secs_f64(options.patience);
     let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-    // With every physics withheld a search is the refit of the nominal model alone.
+    // With every effect withheld a search is the refit of the nominal model alone.
     let settings = Settings { without, effort: options.effort, patience, ..Settings::default() };
     let limit = settings.limit(Some(&stop));
     let fitted = progress::about(settings.expected(), |report| fitted(&problem, &settings, limit, report))?;
@@ -113,7 +113,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     Ok(if disagree { code::NEGATIVE } else { 0 })
 }
 
-/// What to do with the numbers, the most useful first.
+/// What to do with the parameters, the most useful first.
 fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
     let mut steps = Vec::new();
     let agree = fitted.per_record.disagreements().is_empty();
@@ -187,7 +187,7 @@ fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn
     let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();
     all.extend(kept.iter().map(|row| Row { value: row.given.unwrap_or(row.value), at_bound: false, moved_sd: None, ..row.clone() }));
     all.sort_by_key(|row| problem.stated.iter().position(|s| row.name.starts_with(&s.path)).unwrap_or(usize::MAX));
-    // Nothing that was kept stands in what is edited, so that it stays in the text as it was.
+    // Edits name no kept parameter, so the kept ones remain unchanged in the text.
     let model = match free.stated.iter().all(|s| kept.iter().any(|k| k.name == s.path)) {
         true => problem.text.clone(),
         false => refitted_text(&free, &nominal, &spread).map_err(Failure::input)?,

@@ -6,7 +6,7 @@ use crate::output;
 use backdrive_nodes::build::{plan, topics};
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, draw as draw_graph};
 
-/// Loads a graph and every experiment of it, and builds every node, so that what would stop a run is told now.
+/// Loads a graph and every experiment of it, and builds every node, so that what would stop a run is reported now.
 pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
     let graph = Graph::load(&options.graph, &Overrides::default())?;
     let mut graphs = Vec::new();
@@ -27,7 +27,7 @@ pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Whether every node of ours can be built: told before a process is started, and once.
+/// Whether every node of ours can be built: reported before a process is started, and once.
 pub fn buildable(graph: &Graph) -> Result<(), Failure> {
     for node in graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && n.command.is_none()) {
         plan(graph, &node.name).map_err(|e| Failure::input(format!("{}: {e}", graph.path.display())))?;

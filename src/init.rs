@@ -20,7 +20,7 @@ use std::io::IsTerminal;
 const MODEL: &str = "model.toml";
 const SET: &str = "set.toml";
 
-/// Asks, writes, checks, and says what to do next.
+/// Asks, writes, checks, and prints what to do next.
 pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let (model, set) = (options.folder.join(MODEL), options.folder.join(SET));
     may_replace(&model, options.overwrite)?;

@@ -6,7 +6,7 @@ use crate::output;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Becomes true with the first Ctrl-C, or when the caller of a verb says so. To be asked for once in a process of ours.
+/// Becomes true with the first Ctrl-C, or when the caller of a verb requests it. To be asked for once in a process of ours.
 pub fn heard() -> Result<Arc<AtomicBool>, Failure> {
     if let Some(caller) = caller::caller() {
         return Ok(caller.stop.clone());

@@ -45,7 +45,7 @@ pub use run::{Done, run_here};
 use cli::{Cli, Command};
 use std::process::ExitCode;
 
-/// The program: runs what the command line says.
+/// The program: runs the command line.
 pub fn main() -> ExitCode {
     // A file that reaches the size a user is allowed is an error of its writer, with a name, and no end without a word.
     // SAFETY: ignoring a signal runs no code of ours.

@@ -27,7 +27,7 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
         }
         ModelFile::Device(_) => {
             let model = held_model(&file.model, file.grip.as_deref())?;
-            // What cannot be stepped is told now, not at the start of a run.
+            // What cannot be stepped is reported now, not at the start of a run.
             let plant = Plant::new(&model, 2e-4, &Options::default()).map_err(|e| Failure::input(format!("{path}: {e}")))?;
             for remark in remarks(&model, &Operating::small()) {
                 output::note(format_args!(

@@ -1,8 +1,8 @@
 //! Commands that are offered to the user: on a terminal, on a page and in JSON.
 //!
-//! An offered command works when it is pasted into the shell in which this program ran. So it is built from typed parts only: the arguments are parsed
-//! as the command line parses them, a file that is read exists or is written by an earlier command of the same offer, and a file that is written does
-//! not exist yet. What fails one of these is no offer: [`Builder::build`] gives `None`, and only the sentence beside it is shown.
+//! An offered command works when it is pasted into the shell in which this program ran. So it is built from typed parts only. The arguments are parsed as
+//! the command line parses them. A file that is read exists or is written by an earlier command of the same offer. A file that is written does not exist
+//! yet. What fails one of these is no offer: [`Builder::build`] gives `None`, and only the sentence beside it is shown.
 
 use crate::caller;
 use crate::cli::Cli;

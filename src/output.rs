@@ -1,9 +1,8 @@
-//! The one way out of this program: what a verb says, and the files that it writes.
+//! The one way out of this program: the output of a verb, and the files that it writes.
 //!
-//! Results go to standard output. One that cannot be written ends the verb with exit code 5 and a sentence; a reader who has enough
-//! (`| head`) is no error. Everything else goes to standard error, where nobody can be told that it failed. A file that was asked for is
-//! there whole or not at all: it is written beside its place and then moved there
-//! (`move_into_place` of the bags, which are written in the same way).
+//! Results go to standard output. One that cannot be written ends the verb with exit code 5 and a sentence; a reader who has enough (`| head`) is no error.
+//! Everything else goes to standard error, and a failure to write there cannot be reported. A file that was asked for is there whole or not at all: it is
+//! written beside its place and then moved there (`move_into_place` of the bags, which are written in the same way).
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -28,12 +27,12 @@ pub fn line(result: impl Display) -> Result<(), Failure> {
     text(format_args!("{result}\n"))
 }
 
-/// A result on standard output, as it is.
+/// A result on standard output, unchanged.
 ///
 /// # Errors
 /// As [`line()`].
 pub fn text(result: impl Display) -> Result<(), Failure> {
-    // At once: a text that is half written before the error tells no more than none.
+    // At once: a text that is half written before the error is of no more use than none.
     let bytes = result.to_string();
     if caller::kept(&bytes) {
         return Ok(());
@@ -138,7 +137,7 @@ pub fn page(path: &Path, mut page: Page) -> Result<(), Failure> {
 /// likes. Once it is whole it is moved to its place; onto a device or a pipe it is copied. Folders above it are made where they are not there.
 ///
 /// # Errors
-/// What `write` says, with the path that was asked for, and exit code 5 where that is about the file.
+/// The error of `write`, with the path that was asked for, and exit code 5 where that is about the file.
 pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) -> Result<T, Failure> {
     let failed = |e: io::Error| Failure::write(path, e);
     let name = path.file_name().ok_or_else(|| Failure::machine(format!("{}: is no name of a file", path.display())))?;
@@ -182,7 +181,7 @@ pub fn is_stream(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Tells before long work whether a file could be written after it.
+/// Checks before long work whether a file could be written after it.
 ///
 /// # Errors
 /// When it could not.

@@ -13,7 +13,7 @@ const EVERY: Duration = Duration::from_secs(5);
 /// Time between two looks at a bar for the caller of a verb.
 const OFTEN: Duration = Duration::from_millis(100);
 
-/// Tells of a bar until it is finished or gone, where standard error is no terminal to draw it on. `line` says how far it is.
+/// Reports a bar until it is finished or gone, where standard error is no terminal to draw it on. `line` gives its progress.
 fn tell(bar: &ProgressBar, line: impl Fn(&ProgressBar) -> String + Send + 'static) {
     let weak = bar.downgrade();
     if let Some(caller) = caller::caller() {
@@ -46,7 +46,7 @@ fn counted(bar: &ProgressBar) -> String {
     format!("{}: {done} of {all}, after {:.0} s", bar.message(), bar.elapsed().as_secs_f64())
 }
 
-/// While it lives something goes on that may take long and tells no steps; a line says that it does.
+/// While it lives, something goes on that may take long and reports no steps; a line shows that it does.
 pub struct Busy(ProgressBar);
 
 impl Busy {
@@ -66,7 +66,7 @@ impl Drop for Busy {
     }
 }
 
-/// Does what may take long and tells no steps; a line says that it goes on.
+/// Does what may take long and reports no steps; a line shows that it goes on.
 pub fn busy<T>(title: &str, work: impl FnOnce() -> T) -> T {
     let _until_then = Busy::begin(title);
     work()
@@ -86,7 +86,7 @@ pub fn steps(total: u64, title: &str) -> ProgressBar {
     bar
 }
 
-/// A bar that says what is being done, and how much of it is done.
+/// A bar that shows what is being done, and how much of it is done.
 pub fn work() -> ProgressBar {
     let bar = ProgressBar::new(1);
     if let Ok(style) = ProgressStyle::with_template("{msg:28!} {wide_bar} {pos} of {len}, {eta} left") {
@@ -96,7 +96,7 @@ pub fn work() -> ProgressBar {
     bar
 }
 
-/// How long something has taken beside what it takes at most as a rule. That is not told beside a longer time.
+/// The elapsed time, with the usual maximum. The maximum is not shown once it is exceeded.
 fn within(elapsed: Duration, limit: Duration) -> String {
     let s = elapsed.as_secs_f64();
     match elapsed <= limit {
@@ -133,7 +133,7 @@ pub fn about<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) + S
     result
 }
 
-/// Says that work has ended, by a panic too: what waits for the bar would wait for ever.
+/// Signals that work has ended, by a panic too: what waits for the bar would wait for ever.
 struct Ended<'a>(&'a std::sync::atomic::AtomicBool);
 
 impl Drop for Ended<'_> {

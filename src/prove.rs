@@ -134,7 +134,7 @@ fn given_files_are_there(options: &cli::Prove) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Joins a run in the place of its master, with a hidden plant's process behind.
+/// Joins a run instead of its master, with a hidden plant's process behind.
 pub fn sealed_master(options: &cli::SealedMaster) -> ExitCode {
     backdrive_launch::join::join(|graph, node| hidden::core(graph, node, &options.word))
 }

@@ -19,12 +19,12 @@ use backdrive_signal::statistics::deviation;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// What the model says of each joint of the problem.
+/// The parameters that the model states of each joint of the problem.
 fn stated(problem: &Problem) -> Vec<Option<Numbers>> {
     problem.joints.iter().map(|j| j.given).collect()
 }
 
-/// Runs the joints from the commands of recordings, writes their positions, and says how far they are from what was recorded.
+/// Runs the joints from the commands of recordings, writes their positions, and prints their difference from the recorded ones.
 pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
     let path = PathBuf::from(&options.drive);
     let (mut set, _) = open::set_of(std::slice::from_ref(&path))?;
@@ -103,7 +103,7 @@ fn written(
     Ok(json!({ "recording": file, "out": out, "samples": samples, "joints": errors }))
 }
 
-/// Refits the numbers that the model states of each joint, its physics as they are.
+/// Refits the parameters that the model states of each joint, its structure unchanged.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let (mut set, told) = open::set_of(&options.set)?;
     let mut notes = Vec::new();

@@ -16,7 +16,7 @@ use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
 use std::path::{Component, Path, PathBuf};
 
-/// Simulates, writes the predictions, and says how far they are from what was recorded.
+/// Simulates, writes the predictions, and prints their difference from what was recorded.
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
     if !model.servos.is_empty() {
@@ -111,7 +111,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
             .map(|file| {
                 let rules = set.rules_of(file);
                 let recording = read_recording(&set.path_of(file), model, &set.columns, &rules.piece)?;
-                // A recording that lies elsewhere is simulated into the folder all the same, and not onto itself.
+                // A recording outside the folder is simulated into the folder all the same, and not onto itself.
                 let path = Path::new(file);
                 let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
                 let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };

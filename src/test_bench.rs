@@ -16,7 +16,7 @@ use std::path::Path;
 /// The shaft that is written: its structure.
 const SHAFT: &str = include_str!("../plant/models/engine-test-bench.toml");
 
-/// Identifies, writes what a graph takes, and tells the numbers.
+/// Identifies, writes what a graph takes, and prints the parameters.
 pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
     let bad = |e: BenchError| Failure::input(e);
     let record = |path: &Path| Record::of_bag(path).map_err(bad);

@@ -15,7 +15,7 @@ pub fn import_command(recording: &Path) -> Option<String> {
         (false, true) => free(Path::new(""), &stem, ".mcap"),
         (false, false) => return None,
     };
-    // What no shell can be told is no offer.
+    // A command that cannot be passed to a shell is no offer.
     recording.to_str()?;
     Some(format!("backdrive bag import {} --bag {}", path_word(recording), path_word(&bag)))
 }

@@ -1,8 +1,8 @@
 //! How much faster than the clock arms are simulated, by joints and by step, and how far each step is from the converged solution.
 //!
-//! An arm hangs from a ceiling, its joints turn about x and y by turns, each is driven by tones and rubs; `soft` ones have a motor behind a soft gear,
-//! with friction on both sides. The same arms are written as MJCF into `target/arm_speed`, where `time_mujoco.py` takes them from, and what was measured
-//! here goes beside them. `benches/README.md` says how the two are run and what they gave.
+//! An arm hangs from a ceiling. Its joints turn about x and y alternately. Each joint is driven by tones and has friction; `soft` arms have a motor behind
+//! a compliant gear, with friction on both sides. The program also writes the arms as MJCF into `target/arm_speed`, where `time_mujoco.py` reads them, and
+//! puts the results measured here next to them. `benches/README.md` describes how to run both and lists the results.
 
 use backdrive_export::mjcf;
 use backdrive_plant::model::Model;

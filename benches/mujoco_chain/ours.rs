@@ -1,6 +1,6 @@
 //! Time per simulated second of the chain in `chain.toml`, at the step where the solution is within 1 % of its converged one.
 //!
-//! The other side is `time_mujoco.py`; `benches/README.md` says how the two are run and what they gave.
+//! The other side is `time_mujoco.py`; `benches/README.md` describes how to run both and lists the results.
 
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment};

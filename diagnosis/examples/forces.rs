@@ -1,5 +1,5 @@
-//! What a diagnosis sees on forces along a measured motion, for those who calibrate its confidence: for every set a line of JSON with each law that is claimed and its
-//! figures. `cargo run --release --example forces -- SET.toml...`; `tests/concealed/calibrate_forces.py` reads it.
+//! The figures of a diagnosis on forces along a measured motion, for those who calibrate its confidence. For every set it prints a line of JSON with each
+//! law that is claimed and its figures. `cargo run --release --example forces -- SET.toml...`; `tests/concealed/calibrate_forces.py` reads it.
 
 use backdrive_diagnosis::equation_error::figures_of;
 use backdrive_diagnosis::problem::Problem;

@@ -1,6 +1,6 @@
-//! `nulls COUNT [FIRST]`: how often something is said to be missing of devices whose model leaves nothing out. Devices of five kinds are
-//! drawn, simulated with finer steps than the diagnosis takes, measured with noise and encoders, and given back with numbers that are
-//! off in half of the cases.
+//! `nulls COUNT [FIRST]`: how often a diagnosis claims an effect in devices whose model is complete. Devices of five kinds are drawn and simulated with
+//! finer steps than the diagnosis takes. They are measured with noise and encoders. The diagnosis receives their models with parameters that are off in
+//! half of the cases.
 
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};

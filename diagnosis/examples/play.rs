@@ -1,5 +1,5 @@
-//! `play EXCITATIONS.toml --rate HZ --out FILE.csv`: the samples of an excitation file, such as the `next-experiment.toml` beside a verdict, as a program that
-//! plays it has them: a column `t`, then one for each input that it drives.
+//! `play EXCITATIONS.toml --rate HZ --out FILE.csv`: the samples of an excitation file, such as the `next-experiment.toml` beside a verdict. A program that
+//! plays the excitation receives the same samples. The table has a column `t`, then one for each input that it drives.
 
 use backdrive_plant::excitation::load_experiments;
 use std::fmt::Write;

@@ -1,8 +1,9 @@
-//! `profile SET...`: 95 % intervals of the numbers of the explanation that is chosen, beside those of its profile likelihood.
+//! `profile SET...`: 95 % intervals of the parameters of the explanation that is chosen, beside those of its profile likelihood.
 //!
-//! The profile of a number is the least cost with that number held, all others fitted anew; its interval ends where this is 3.84 above the least of all, in units of
-//! the residual's mean square over the samples that are worth one. It knows no more than the fit does of what the noise is, and needs no quadratic cost. A row for each
-//! number: set, structure, number, its value, both ends of either interval in the fit's own unit, and the ratio of their widths; at the end the ratios' quantiles.
+//! The profile of a parameter is the least cost with that parameter held and all others refitted. Its interval ends where the profile is 3.84 above the
+//! least cost of all, in units of the residual's mean square over the number of effective samples. It assumes no more about the noise than the fit does,
+//! and needs no quadratic cost. One row per parameter: set, structure, parameter, its value, both ends of either interval in the fit's own unit, and the
+//! ratio of their widths. At the end the quantiles of the ratios.
 
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::evaluator::Evaluator;
@@ -59,7 +60,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Where the profile of a number ends on both sides, in the fit's own unit; `None` where it does not end within the number's bounds.
+/// Where the profile of a parameter ends on both sides, in the fit's own unit; `None` where it does not end within the parameter's bounds.
 fn profile(evaluator: &Evaluator, best: &Candidate, spread: &Uncertainty, number: usize) -> Option<(f64, f64)> {
     let structure = &best.structure;
     let own = structure.free[number].to_internal(best.fit.values[number]);

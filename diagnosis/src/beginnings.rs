@@ -14,8 +14,8 @@ pub(crate) struct Beginnings {
 }
 
 impl Beginnings {
-    /// Of the two recordings on which these residuals are largest, so much that as large a residual is seen there per sample as in the whole of them, or nearly; all of
-    /// them where parameters belong to single recordings, or to their ends.
+    /// Beginnings of the two recordings with the largest of these residuals. Each is long enough that its residual per sample is as large as in the whole
+    /// recording, or nearly. Where parameters belong to single recordings, or to their ends, all recordings in full.
     pub fn of_the_worst(evaluator: &Evaluator, residuals: &[f64]) -> Beginnings {
         let whole = |r: usize| (r, evaluator.records.get(r).map_or(0, |record| record.len));
         if !can_be_cut(evaluator.problem) {

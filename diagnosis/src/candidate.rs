@@ -1,4 +1,4 @@
-//! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
+//! A structure, fitted, and the measures of its quality: the data that fitting, proposals, schedule and verdict use.
 
 use crate::compare::{HeldOut, blocks};
 use crate::evaluator::Evaluator;
@@ -28,7 +28,8 @@ pub struct Candidate {
     pub may_be_nothing: bool,
     /// Its residual on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<HeldOut>,
-    /// The same with its numbers let go as far as the fitted recordings leave open, see [`crate::released_parameters`]; `None` where nothing hangs on it.
+    /// The same with its parameters released as far as the fitted recordings leave them open, see [`crate::released_parameters`]; `None` where no decision
+    /// depends on it.
     pub released: Option<HeldOut>,
 }
 
@@ -43,7 +44,7 @@ pub(crate) fn white(correlation_time: f64, whiteness_statistic: f64) -> bool {
     correlation_time < tuning().noise.white_correlation && whiteness_statistic < tuning().noise.white_statistic
 }
 
-/// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
+/// How good a candidate is beside others of the same search: its cost with a price on each parameter, the lower the better.
 pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f64 {
     let effective = (samples as f64 / correlation_time).max(2.0);
     effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.free.len() as f64 * effective.ln()

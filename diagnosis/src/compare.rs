@@ -15,8 +15,8 @@ use serde::Serialize;
 /// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.
 pub type Predicted = Vec<Option<Vec<f64>>>;
 
-/// A structure with these values, ready for held-out recordings: where a record starts freely, or a number is free in it, that
-/// is fitted to the record, and nothing else.
+/// A structure with these values, ready for held-out recordings: where a record starts freely, or a parameter is free in it, that is fitted to the record,
+/// and nothing else.
 struct Ready {
     fixed: Problem,
     own: Structure,
@@ -38,8 +38,8 @@ impl Ready {
     }
 }
 
-/// Predictions of a structure with these values for each of `records`. Where a record starts freely, or a number is free in it, that is
-/// fitted first, and nothing else. `None` where the structure cannot be simulated.
+/// Predictions of a structure with these values for each of `records`. Where a record starts freely, or a parameter is free in it, that is fitted first,
+/// and nothing else. `None` where the structure cannot be simulated.
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
     let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
     let budget = Budget::default();
@@ -92,9 +92,9 @@ pub fn blocks(evaluator: &Evaluator, residuals: &[f64]) -> Vec<Vec<f64>> {
     evaluator.layout().into_iter().filter_map(|(_, _, range)| residuals.get(range)).map(of).collect()
 }
 
-/// Mean squared error of a structure with these values at every output measured in every record, in the unit squared: record by record, outputs
-/// in the order of [`measured`]. Where records start freely, or a number is free in a file, that is fitted first, and nothing else. `None` where the
-/// structure cannot be simulated.
+/// Mean squared error of a structure with these values at every output measured in every record, in the unit squared: record by record, outputs in the
+/// order of [`measured`]. Where records start freely, or a parameter is free in a file, that is fitted first, and nothing else. `None` where the structure
+/// cannot be simulated.
 pub fn mean_squares(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<f64>> {
     let predicted = predictions(problem, records, structure, values)?;
     let mut all = Vec::new();

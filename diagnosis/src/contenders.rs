@@ -16,7 +16,7 @@ use crate::tuning::tuning;
 use crate::verdict::chosen;
 use crate::work::Budget;
 
-/// The search with fits of what could stand in the place of each effect that would be claimed, as far as the budget goes. `without`: physics that is withheld.
+/// The search, with fits of possible alternatives to each effect that would be claimed, as far as the budget allows. `without`: effects that are withheld.
 pub fn with_contenders<'a>(problem: &'a Problem, search: Search, without: &[String], budget: &Budget<'a>) -> Search {
     let more = contenders(problem, &search, without, budget);
     let mut search = search;
@@ -58,7 +58,7 @@ fn brought_on<'a>(problem: &'a Problem, search: &Search, budget: &Budget<'a>) ->
     budget.abreast(&open, on).into_iter().flatten().flatten().collect()
 }
 
-/// What is to be fitted in the place of one effect.
+/// What is fitted instead of one effect.
 struct Seed<'h> {
     slot: usize,
     hypothesis: &'h Hypothesis,
@@ -85,7 +85,7 @@ fn contenders<'a>(problem: &'a Problem, search: &Search, without: &[String], bud
         return Vec::new();
     };
     let fitted = budget.abreast(&seeds, |budget, seed| fit(&evaluator.within(budget.clone()), (best, limit * there), seed));
-    // A fit that was cut short on its way says nothing of its law.
+    // A fit that was cut short is no evidence on its law.
     let is_done = |fit: &Fit| effective * 2.0 * fit.predicted_decrease < tuning().claim.alike * fit.cost;
     let near = fitted.into_iter().flatten().flatten().filter(|(_, fit)| fit.cost < limit * best.fit.cost && is_done(fit));
     let held_out = |mut c: Candidate| {
@@ -111,14 +111,15 @@ fn seeds<'h>(problem: &Problem, search: &Search, best: &Candidate, hypotheses: &
             }
         }
     }
-    // Of equals the simpler: a law of more numbers mostly does what it does as one of its limits.
+    // Of equals the simpler: a law of more parameters mostly does what it does as one of its limits.
     let numbers = |s: &Seed| s.hypothesis.parameters.len();
     all.sort_by(|a, b| numbers(a).cmp(&numbers(b)).then(b.promised.total_cmp(&a.promised)));
     all.truncate(tuning().experiment.contenders);
     all
 }
 
-/// The best with one effect exchanged, from the numbers that the rest has: the start that comes nearest in a few steps goes on, where it foresees a cost below `limit`.
+/// The best with one effect exchanged, from the other parameters' values. The start that comes nearest in a few steps goes on, where it predicts a cost
+/// below `limit`.
 fn fit(evaluator: &Evaluator, (best, limit): (&Candidate, f64), seed: &Seed) -> Option<(Structure, Fit)> {
     let problem = evaluator.problem;
     let (mut added, mut values) = (best.structure.added.clone(), best.structure.added_of(&best.fit.values));

@@ -1,5 +1,5 @@
-//! The first part of a race, coupled to the measured motion: simulations are short there, fits go far in a step, and the residual tells laws
-//! apart that a free simulation does not show until all else is right.
+//! The first part of a race, coupled to the measured motion. Simulations are short there and one step of a fit goes far. The residual separates laws that a
+//! free simulation does not separate until everything else is right.
 
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
@@ -34,7 +34,7 @@ impl Course<'_> {
             begun = self.rank_and_go_on(begun, count);
         }
         begun = self.loosen(begun, count);
-        // What shows best on a free simulation may show little where it is coupled, and several physics may show there nearly as well.
+        // What shows best on a free simulation may show little where it is coupled, and several effects may show there nearly as well.
         let others = seeds.iter().filter(|s| !s.coupled_first).take(tuning().search.uncoupled).map(|seed| self.entry(seed));
         begun.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(others).collect()
     }

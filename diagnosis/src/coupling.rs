@@ -1,9 +1,9 @@
 //! A model coupled to what was measured (a tracking observer): a soft spring, damper or inerter pulls each measured body along its recording.
 //!
-//! Under a force that the model leaves out a free simulation diverges from the recording. Its residuals then have little to do with the place where
-//! the physics acts, and they depend on the parameters roughly: a slip a moment later is another valley. Coupled to the measured motion, the residuals
-//! show where and when the missing force acts, the effects of several physics add up, and fits converge from far. The stronger the coupling, the more
-//! the residuals are forces; without it they are simulation errors. Fits go from one to the other.
+//! Under a force that the model leaves out a free simulation diverges from the recording. Its residuals then have little to do with the place where the
+//! effect acts. They are not a smooth function of the parameters: a slip a moment later is another local minimum. Coupled to the measured motion, the
+//! residuals show where and when the missing force acts, several effects add up, and fits converge from far. The stronger the coupling, the more the
+//! residuals are forces; without it they are simulation errors. Fits go from one to the other.
 
 use crate::hypothesis::Scales;
 use crate::problem::{Problem, Record};

@@ -1,5 +1,5 @@
-//! Derivatives of the residuals by the parameters of a fit: carried along with the motion (forward mode) where a parameter is one of a nonlinear model's
-//! bodies or elements, else by differences of simulations; in parallel.
+//! Derivatives of the residuals by the parameters of a fit, in parallel. They are integrated along with the motion (forward mode) where a parameter is one
+//! of a nonlinear model's bodies or elements, else computed by differences of simulations.
 
 use crate::evaluator::{Evaluator, residuals_in};
 use crate::structure::{FreeParameter, Role, Structure};
@@ -88,8 +88,8 @@ impl Evaluator<'_> {
         found.into_iter().flatten().collect()
     }
 
-    /// Derivatives that are carried along with the motion, in no more substeps than a direction of descent asks for; `None` by parameters that belong to an
-    /// input, an output or a single record, by all where the model is linear, and where it cannot be simulated.
+    /// Derivatives that are integrated along with the motion, in no more substeps than a descent direction needs. `None` for parameters that belong to an
+    /// input, an output or a single record. `None` for all parameters where the model is linear, and where it cannot be simulated.
     fn carried(&self, structure: &Structure, own: &[f64], residuals: usize, which: &[usize]) -> Vec<Option<Vec<f64>>> {
         let mut found = vec![None; which.len()];
         let values = to_external(structure, own);
@@ -158,8 +158,8 @@ impl Evaluator<'_> {
         Some((values.clone(), structure.model(self.problem, &values)?, step))
     }
 
-    /// Derivatives by the weights of unknown inputs (Curtis, Powell & Reid 1974): the effect of a weight is over when the next that is moved along
-    /// with it begins, but for what the device never forgets.
+    /// Derivatives by the weights of unknown inputs (Curtis, Powell & Reid 1974). The effect of a weight is over when the next one that is moved with it
+    /// begins, except for what the device never forgets.
     fn knots(
         &self,
         structure: &Structure,
@@ -289,7 +289,7 @@ mod tests {
             .unwrap()
     }
 
-    /// By each number: carried along, where it can be, and differenced.
+    /// By each parameter: carried along, where it can be, and differenced.
     type Both = (Structure, Vec<Option<Vec<f64>>>, Vec<Vec<f64>>);
 
     fn derivatives(problem: &Problem) -> Both {

@@ -66,7 +66,7 @@ pub fn diagnose(
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
     let (problem, contradicted) = without_contradicted(problem);
-    // What is measured beside its own position says more than beside a model.
+    // A comparison with the signal's own position is stronger evidence than one with a model.
     remarks.retain(|r| !(matches!(r.about, "sign" | "unit") && contradicted.iter().any(|c| c.signal == r.signal)));
     remarks.extend(contradicted);
     let (problem, search) = searched(problem, settings, limit, report, &mut remarks)?;

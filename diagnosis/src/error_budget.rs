@@ -1,4 +1,4 @@
-//! What is off in a prediction although no physics is missing: the integration, when samples were taken, steps of encoders.
+//! Errors in a prediction although no effect is missing: the integration, when samples were taken, steps of encoders.
 
 use crate::candidate::Candidate;
 use crate::evaluator::{Evaluator, measured};
@@ -45,7 +45,7 @@ pub struct BudgetedError {
     pub noise_sd: f64,
 }
 
-/// Every error of the predictions of a fitted structure; `holds` is what it says of inputs between their samples.
+/// Every error of the predictions of a fitted structure; `holds` is its evidence on inputs between their samples.
 pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -> Vec<BudgetedError> {
     let (structure, values) = (&fitted.structure, &fitted.fit.values);
     let (problem, noise_sd) = (evaluator.problem, &evaluator.noise_sd);
@@ -88,8 +88,8 @@ pub fn beside_noise(all: &[BudgetedError]) -> f64 {
     largest(all, |source| !matches!(source, Source::Rounding | Source::Hold))
 }
 
-/// The same of what the recordings do not say as they were taken: two structures, each of which has bent its numbers to that, are not told apart by as much. Finer steps of
-/// the integration change both alike.
+/// The same for errors of the recordings as they were taken. Two structures whose parameters have adapted to such an error cannot be separated by less than
+/// its size. Finer steps of the integration change both alike.
 pub fn of_sensors(all: &[BudgetedError]) -> f64 {
     largest(all, |source| matches!(source, Source::Clock | Source::Differencing))
 }
@@ -99,8 +99,8 @@ fn largest(all: &[BudgetedError], counts: impl Fn(Source) -> bool) -> f64 {
     all.iter().map(|e| of(&e.output)).fold(0.0, f64::max)
 }
 
-/// What a mean over a sample differs from the value at its middle, in the place of each residual, normalised: a twenty-fourth of the second difference of the predicted
-/// velocity, the first term of its series. 0 for outputs that are no velocities in steps.
+/// Difference between a mean over a sample and the value at its middle, for each residual, normalised. It is a twenty-fourth of the second difference of
+/// the predicted velocity, the first term of its series. 0 for outputs that are not velocities in steps.
 fn differencing(evaluator: &Evaluator, residuals: &[f64], is_in_steps: &dyn Fn(usize) -> bool) -> Vec<f64> {
     let outputs = &evaluator.problem.model.outputs;
     let mut all = vec![0.0; residuals.len()];

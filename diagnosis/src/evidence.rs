@@ -61,8 +61,8 @@ pub struct Evidence {
     pub traces: Vec<Trace>,
 }
 
-/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `noise_sd` is the noise
-/// standard deviation of each output, in its unit.
+/// Evidence of one of the effects that a candidate adds; `None` where nothing can be located there. `noise_sd` is the noise standard deviation of each
+/// output, in its unit.
 pub fn evidence(problem: &Problem, best: &Candidate, noise_sd: &[f64], which: usize) -> Option<Evidence> {
     let finding = best.structure.added.get(which)?;
     let values = &best.fit.values;
@@ -103,7 +103,7 @@ fn under(model: &Model, record: &Record) -> Model {
     let mut model = model.clone();
     for (path, condition) in &record.conditions {
         if let Condition::Value(value) = condition {
-            // A path that the added physics replaced has no value to take.
+            // A path that the added effect replaced has no value to take.
             let _ = model.set_values_at(path, &[*value]);
         }
     }

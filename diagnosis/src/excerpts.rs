@@ -1,7 +1,7 @@
 //! Excerpts of recordings that show enough: where many structures are tried, each is simulated only where the residual is largest.
 //!
-//! A part is the recording's beginning where that shows enough. Others begin with the motion that the base of the search has there when it
-//! is coupled firmly; their first samples do not count, for laws with a memory begin without one.
+//! A part is the recording's beginning where that shows enough. Other parts begin with the motion of the search's base model, firmly coupled to the
+//! measured motion. Their first samples do not count, because laws with a memory begin without one.
 
 use crate::coupling::Coupling;
 use crate::evaluator::Evaluator;
@@ -34,7 +34,7 @@ impl Excerpts {
             return None;
         }
         let model = structure.model(problem, &fit.values)?;
-        // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
+        // Firmly coupled, so that a part begins with the measured motion, not with the motion of an incomplete model.
         let firm = evaluator.coupling.as_ref().map(|g| g.with(tuning().coupling.firm * g.strength));
         let layout = evaluator.layout();
         // No part can begin with a memory of what came before.

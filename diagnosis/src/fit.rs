@@ -34,8 +34,8 @@ impl Evaluator<'_> {
 
     /// The same with derivatives that another fit found, of this structure or of one that shares its first parameters: good enough for the first steps.
     ///
-    /// Derivatives are carried along by secant updates, and computed anew when a step disappoints, every few steps, and before the fit says that it
-    /// has converged.
+    /// Derivatives are carried along by secant updates. They are recomputed when a step disappoints, every few steps, and before the fit reports
+    /// convergence.
     pub fn fit_from_derivatives(
         &self,
         structure: &Structure,
@@ -139,7 +139,7 @@ impl<'e, 'a> Descent<'e, 'a> {
     ) -> Option<Descent<'e, 'a>> {
         let numbers = &structure.free;
         let own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.to_internal(*v)).collect();
-        // A weight that a part of a recording says nothing of stays where it is.
+        // A weight on which a part of a recording carries no information stays where it is.
         let centred = |(n, x): (&FreeParameter, &f64)| {
             n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread))
         };
@@ -184,7 +184,7 @@ impl<'e, 'a> Descent<'e, 'a> {
         (effort.tolerance * self.unit()).max(share)
     }
 
-    /// Computes the derivatives anew.
+    /// Recomputes the derivatives.
     fn renew(&mut self) {
         self.jacobian = self.evaluator.all_columns(self.structure, &self.own, &self.residuals, &self.moving, self.stretch);
         self.age = 0;

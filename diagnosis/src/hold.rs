@@ -1,7 +1,7 @@
 //! How an input runs between its samples, where the model file does not say: what that assumption is worth, and what the recordings say of it.
 //!
-//! A force is taken as held, as a servo does; a force that was measured runs on, and is early by half a sample where it is held. Nothing in a device is early,
-//! so that a lead of just that is told from physics.
+//! A force is taken as held, as a servo does. A measured force runs on between its samples, and is early by half a sample where it is modelled as held.
+//! Nothing in a device is early, so a lead of exactly that size can be distinguished from an effect.
 
 use crate::candidate::Candidate;
 use crate::evaluator::Evaluator;
@@ -83,7 +83,7 @@ impl Told {
     }
 }
 
-/// What a fitted structure's residual says of each input that is assumed to be held.
+/// The evidence of a fitted structure's residual on each input that is assumed to be held.
 pub fn told(evaluator: &Evaluator, fitted: &Candidate) -> Vec<Told> {
     let problem = evaluator.problem;
     let fit = &fitted.fit;
@@ -101,7 +101,7 @@ pub fn told(evaluator: &Evaluator, fitted: &Candidate) -> Vec<Told> {
         projector.apply(&mut left);
         let size = dot(&column, &column);
         let share = if size > 0.0 { -dot(&column, &left) / size } else { 0.0 };
-        // Each residual is one of so many that go together; what the model leaves counts as noise.
+        // Neighbouring residuals are correlated, so each counts for less than one; the residual of the model counts as noise.
         let unit = (dot(&left, &left) / left.len().max(1) as f64).max(1.0) * fitted.correlation_time;
         let deviation = if size > 0.0 { (unit / (size * stride as f64)).sqrt() } else { f64::INFINITY };
         Some(Told { input, changes, share, deviation })

@@ -14,9 +14,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// that are correlated count as fewer, and whatever is unexplained counts as error.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// One for each number; infinite where the recordings do not determine it.
+    /// One for each parameter; infinite where the recordings do not determine it.
     pub deviation: Vec<f64>,
-    /// How far each number may be off beside that, whatever the noise: what the fit's last step and finer simulation steps would move it.
+    /// How far each parameter may be off in addition, whatever the noise: what the fit's last step and finer simulation steps would move it.
     pub bias: Vec<f64>,
     /// Correlation of each with each.
     pub correlation: DMatrix<f64>,
@@ -47,8 +47,9 @@ impl Uncertainty {
         Uncertainty { deviation, bias: vec![0.0; n], correlation }
     }
 
-    /// The same, measured where the fit ended: derivatives from both sides, the scatter of the scores over blocks of the recordings
-    /// (residuals are correlated, and their variance differs from place to place: Huber's sandwich estimate by blocks), and what finer steps of the simulation would change.
+    /// The same, measured where the fit ended, from three sources. Derivatives are taken from both sides. The scatter of the scores is taken over blocks of
+    /// the recordings, because residuals are correlated and their variance differs from place to place: Huber's sandwich estimate by blocks. The third is
+    /// the change caused by finer steps of the simulation.
     pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Uncertainty {
         let mut spread = Uncertainty::of(candidate);
         let structure = &candidate.structure;
@@ -105,8 +106,8 @@ impl Uncertainty {
         spread
     }
 
-    /// Whether some of these parameters lie elsewhere than the fit has them by more than chance: `others` are places among the fit's parameters, and values as
-    /// they stand in the model. All together, for parameters that go together may each lie in its own interval.
+    /// Whether some of these parameters differ from their fitted values by more than chance. `others` are places among the fit's parameters, and their
+    /// values in the units of the model. All are tested jointly, because each of several correlated parameters may lie in its own interval.
     pub fn is_far(&self, candidate: &Candidate, others: &[(usize, f64)]) -> bool {
         let away = |(number, other): &(usize, f64)| {
             let (n, value) = (candidate.structure.free.get(*number)?, candidate.fit.values.get(*number)?);
@@ -121,13 +122,13 @@ impl Uncertainty {
         ChiSquared::new(known.len() as f64).is_ok_and(|d| d.sf(square) < tuning().claim.significance)
     }
 
-    /// Half of a number's 95 % interval, in the fit's own unit.
+    /// Half of a parameter's 95 % interval, in the fit's own unit.
     pub fn half(&self, number: usize) -> f64 {
         let deviation = self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
         tuning().intervals.wider * NORMAL_975 * deviation + self.bias.get(number).copied().unwrap_or(0.0)
     }
 
-    /// 95 % interval of a number, as it stands in the model.
+    /// 95 % interval of a parameter, in the unit of the model.
     pub fn interval(&self, candidate: &Candidate, number: usize) -> [f64; 2] {
         let (Some(n), Some(value)) = (candidate.structure.free.get(number), candidate.fit.values.get(number)) else {
             return [f64::NAN; 2];
@@ -138,7 +139,7 @@ impl Uncertainty {
         [n.to_external((own - half).max(low)), n.to_external((own + half).min(high))]
     }
 
-    /// The same, one-sided where the number is at a bound: the recordings say only that it is no less far than that. `None` for an open end.
+    /// The same, one-sided where the parameter is at a bound: the recordings then show only that it is no less far than that. `None` for an open end.
     pub fn one_sided(&self, candidate: &Candidate, number: usize) -> [Option<f64>; 2] {
         let [low, high] = self.interval(candidate, number).map(|end| Some(end).filter(|x| x.is_finite()));
         let bound = candidate.structure.free.get(number).zip(candidate.fit.values.get(number)).and_then(|(n, value)| n.at_bound(*value));
@@ -149,8 +150,8 @@ impl Uncertainty {
         }
     }
 
-    /// Adds what other explanations of nearly the same fit make of the same numbers, each with a weight of 0 to 1: numbers are as unsure as the structure
-    /// around them.
+    /// Adds the spread of the same parameters over other explanations of nearly the same fit, each with a weight of 0 to 1: parameters are as uncertain as
+    /// the structure around them.
     pub fn beside(&mut self, candidate: &Candidate, others: &[(&Candidate, f64)]) {
         let structure = &candidate.structure;
         let sum = 1.0 + others.iter().map(|(_, weight)| weight).sum::<f64>();
@@ -168,7 +169,7 @@ impl Uncertainty {
     }
 }
 
-/// Whether numbers of two structures are the same one.
+/// Whether parameters of two structures are the same one.
 fn is_same(a: &Structure, number: &FreeParameter, b: &Structure, other: &FreeParameter) -> bool {
     match (&number.role, &other.role) {
         (Role::Added(h, p), Role::Added(k, q)) => {
@@ -227,7 +228,7 @@ mod tests {
     #[test]
     fn numbers_that_go_together_are_nearer_than_each_says() {
         let of = |off: [f64; 2], rho: f64| distance_square(&off, DMatrix::from_row_slice(2, 2, &[1.0, rho, rho, 1.0]));
-        // 2/(1 + rho) along the direction in which they go together, 2/(1 - rho) across it.
+        // 2/(1 + rho) along the direction in which they vary jointly, 2/(1 - rho) across it.
         for rho in [0.0, 0.5, 0.9] {
             assert!((of([1.0, 1.0], rho) / (2.0 / (1.0 + rho)) - 1.0).abs() < 1e-4);
             assert!((of([1.0, -1.0], rho) / (2.0 / (1.0 - rho)) - 1.0).abs() < 1e-4);

@@ -71,7 +71,7 @@ pub struct Kinematics {
     pub explained: f64,
     /// How much later than the derivative it is, s; negative where it is earlier.
     pub lag_s: f64,
-    /// Half-width of the 95 % interval of that, s; infinite where it cannot be told.
+    /// Half-width of the 95 % interval of that, s; infinite where it cannot be determined.
     pub half_s: f64,
     /// Sample time of the recording, s.
     pub period: f64,

@@ -1,8 +1,8 @@
-//! Where model and recording part, and which physics was left out.
+//! Where model and recording part, and which effects the model lacks.
 //!
-//! [`problem::Problem`] is a nominal model and its recordings; [`fit`] refits a structure by simulation error; a
-//! [`hypothesis::Hypothesis`] is a physics at a place; [`search`] finds which of them the recordings ask for, and
-//! [`verdict`] says what follows, as a file and a model. [`diagnose::diagnose`] does all of it.
+//! [`problem::Problem`] is a nominal model and its recordings, and [`fit`] refits a structure by simulation error. A [`hypothesis::Hypothesis`] is an
+//! effect at a place, and [`search`] finds which hypotheses the recordings require. [`verdict`] gives the result as a file and a model.
+//! [`diagnose::diagnose`] does all of it.
 
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]

@@ -5,8 +5,8 @@ use crate::tuning::tuning;
 use backdrive_plant::model::Model;
 use backdrive_signal::statistics::middle;
 
-/// Standard deviation of the white part of a signal, in its unit: over differences of rising order, each scaled so that
-/// white noise keeps its size, the smallest of the medians over blocks. `None` for fewer than 40 samples.
+/// Standard deviation of the white part of a signal, in its unit. It is the smallest of the medians over blocks, over differences of rising order, each
+/// scaled so that white noise keeps its size. `None` for fewer than 40 samples.
 pub fn white(samples: &[f64]) -> Option<f64> {
     blocks_of(samples).map(|blocks| median_of_orders(&[blocks]))
 }
@@ -65,7 +65,7 @@ fn of(signals: &[&[f64]], least: f64, spread: f64) -> f64 {
     white.max(least).max(tuning().recordings.least_noise * spread)
 }
 
-/// Noise standard deviation that the model file states for an output, with that of rounding to its resolution q, q/√12; where the file states no
+/// Noise standard deviation that the model file states for an output, with that of rounding to its resolution q, q/√12. Where the file states no
 /// resolution, the step of the samples is taken.
 pub fn stated(model: &Model, output: usize, signals: &[&[f64]]) -> f64 {
     let Some(o) = model.outputs.get(output) else { return 0.0 };

@@ -10,18 +10,18 @@ use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::{Edit, PatchError, Value, patch, round_significant};
 use serde::Serialize;
 
-/// A number of a fit.
+/// A parameter of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Path in the model, such as `elements.cable.stiffness`; of added physics its id and key; of a record's start what starts where.
+    /// Path in the model, such as `elements.cable.stiffness`; of an added effect its id and key; of a record's start what starts where.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// What the file says; `None` for what it does not state.
+    /// The value in the file; `None` where the file has none.
     pub given: Option<f64>,
     /// As fitted.
     pub value: f64,
-    /// Standard error, in the number's unit; not finite where the recordings do not determine it.
+    /// Standard error, in the parameter's unit; not finite where the recordings do not determine it.
     pub standard_error: f64,
     /// 95 % interval.
     pub ci95: [f64; 2],
@@ -29,7 +29,7 @@ pub struct Row {
     pub moved_sd: Option<f64>,
     /// Whether the recordings say more of it than what was assumed before.
     pub determined: bool,
-    /// Whether it ended at the edge of what a fit may try.
+    /// Whether it ended at a bound of the range that a fit may try.
     pub at_bound: bool,
 }
 
@@ -44,7 +44,7 @@ pub struct Pair {
     pub correlation: f64,
 }
 
-/// Every number of a fit.
+/// Every parameter of a fit.
 pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Vec<Row> {
     // The weights of a curve that nobody measured are no parameters of the device.
     let numbers = candidate.structure.free.iter().zip(&candidate.fit.values).enumerate();
@@ -95,7 +95,7 @@ pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Uncertainty
     all
 }
 
-/// Name of a number of a fit, as [`Row::name`].
+/// Name of a parameter of a fit, as [`Row::name`].
 pub fn name_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
     let Some(number) = candidate.structure.free.get(index) else { return String::new() };
     let record = |r: usize| problem.fit.get(r).map_or("?", |r| r.name.as_str());
@@ -142,7 +142,7 @@ fn unit_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
     }
 }
 
-/// Unit of a number of the model by its path; empty where it has none.
+/// Unit of a parameter of the model by its path; empty where it has none.
 fn unit_of_path(problem: &Problem, path: &str) -> String {
     problem.model.unit_at(path).ok().filter(|unit| unit != "-").unwrap_or_default()
 }

@@ -1,5 +1,5 @@
-//! The same structure fitted to each record by itself: parameters that differ from record to record by more than their errors are the sign
-//! of a wrong structure, for a device has one set of parameters.
+//! The same structure fitted to each record by itself. A device has one set of parameters, so parameters that differ from record to record by more than
+//! their errors indicate a wrong structure.
 
 use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
@@ -12,21 +12,21 @@ use crate::work::Budget;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// A number as one record alone has it.
+/// A parameter as estimated from one record alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Own {
     /// As fitted.
     pub value: f64,
     /// 95 % interval.
     pub ci95: [f64; 2],
-    /// Whether this record says something of it by itself.
+    /// Whether this record by itself carries information on it.
     pub determined: bool,
 }
 
-/// A number in every record.
+/// A parameter in every record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Across {
-    /// Path in the model; of added physics its id and key.
+    /// Path in the model; of an added effect its id and key.
     pub name: String,
     /// One for each record of [`PerRecord::records`].
     pub own: Vec<Own>,
@@ -43,7 +43,7 @@ pub struct PerRecord {
     pub records: Vec<String>,
     /// Root mean square of the residual of each record's own fit at each output, noise standard deviations.
     pub levels: Vec<Vec<f64>>,
-    /// Every number that all records share.
+    /// Every parameter that all records share.
     pub numbers: Vec<Across>,
 }
 

@@ -7,7 +7,7 @@ use crate::tuning::tuning;
 pub struct Gain {
     /// Mean over the blocks of the logarithm of the ratio of their mean squared errors, the other's over its own: positive where it predicts better.
     pub mean: f64,
-    /// Standard error of that mean: from the scatter of the blocks, neighbours of which may go together.
+    /// Standard error of that mean, from the scatter of the blocks; neighbouring blocks may be correlated.
     pub error: f64,
     /// Share of what the blocks say that speaks for it, 0 to 1: the gains over gains and losses.
     pub share: f64,

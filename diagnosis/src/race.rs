@@ -171,7 +171,7 @@ impl Course<'_> {
         begun.into_iter().flatten().flatten().collect()
     }
 
-    /// The last stage: so many are fitted to their ends. Those behind stay as they are: they are rivals, if beaten ones.
+    /// The last stage: the best `count` structures are fitted to their ends. Those behind are not changed: they are rivals, if beaten ones.
     fn fit_to_the_end(&self, running: &mut Vec<Running>, count: usize) {
         let (lead, effort) = (Lead::of(running), tuning().fit.to_the_end);
         let rest = running.split_off(count.min(running.len()));
@@ -187,8 +187,8 @@ impl Course<'_> {
         running.extend(rest);
     }
 
-    /// A start of a law that replaces elements of the model, with their parameters as a fit has them: the law's own starts have those of an early refit, far
-    /// from which another effect may have led.
+    /// A start of a law that replaces elements of the model, with their parameters from a fit. The law's own starts have those of an early refit, and
+    /// another effect may have moved the parameters far from these.
     pub(crate) fn with_replaced(&self, (structure, values): (&Structure, &[f64]), law: &Hypothesis, start: Vec<f64>) -> Vec<f64> {
         let problem = self.evaluator.problem;
         let of_replaced = |path: &str| law.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}.")));
@@ -213,8 +213,8 @@ impl Course<'_> {
     }
 }
 
-/// A start whose curves of unknown inputs are fitted beside the rest of it, with derivatives that another fit knows: a law begins beside a hand that
-/// goes with it, and not with what was found without it.
+/// A start whose curves of unknown inputs are fitted to the rest of it, with derivatives that another fit knows. A law then begins with a hand that is
+/// consistent with it, not with the hand that was found without it.
 pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>, structure: &Structure, start: Vec<f64>) -> Vec<f64> {
     if evaluator.problem.unknown.is_empty() {
         return start;

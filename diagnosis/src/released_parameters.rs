@@ -1,8 +1,8 @@
-//! How well a structure predicts recordings that no fit has seen where its numbers may be as far off as the fitted recordings leave open.
+//! How well a structure predicts held-out data when its parameters may be as far off as the fitted recordings leave open.
 //!
-//! A prediction is off because the structure is wrong, or because its numbers are not known well. Of two structures that fit alike, the one whose numbers happened to end
-//! nearer says nothing of the device. So both are fitted to all recordings together, and held against each other by what they then leave on the unseen ones and what that
-//! costs on the others.
+//! A prediction is off because the structure is wrong, or because its parameters are not known well. Of two structures that fit alike, the one whose
+//! parameters happen to be nearer is not thereby the better model of the device. So both are fitted to all recordings together. They are compared by their
+//! residuals on the unseen recordings and by the increase of cost on the others.
 
 use crate::candidate::Candidate;
 use crate::compare::{HeldOut, blocks};
@@ -16,7 +16,8 @@ use crate::verdict::{chosen, decided_by_unseen};
 use crate::work::{Budget, Limit, Steps};
 use rayon::prelude::*;
 
-/// Lets the numbers go of what is chosen, and of structures of as many effects that the unseen recordings alone tell from it. Then of what is chosen for that.
+/// Releases the parameters of the chosen structure, and of structures of as many effects that only the unseen recordings separate from it. Then those of
+/// the structure chosen for that.
 pub fn hold_with_released_parameters(problem: &Problem, search: &mut Search, limit: Limit) {
     for _ in 0..tuning().search.finalists {
         let best = chosen(search);
@@ -66,7 +67,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// A cart of 2 kg that is hardly moved while it is fitted, and moved far when it is not: its numbers are not known well there.
+    /// A cart of 2 kg that is hardly moved in the fitted recording, and moved far in the held-out one: its parameters are not known well there.
     #[test]
     fn numbers_that_were_not_known_well_are_no_fault_of_the_structure() {
         let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[elements]]\nname = 'spring'\nkind = 'spring'\nbetween = ['cart', 'ground']\nstiffness = 800.0\n\

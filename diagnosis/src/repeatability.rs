@@ -66,8 +66,9 @@ fn recordings(a: &Record, b: &Record) -> Vec<(usize, f64)> {
     both.filter_map(|(o, (x, y))| Some((o, deviation(x.as_deref()?, &on(y.as_deref()?))))).collect()
 }
 
-/// Periods of a recording whose inputs repeat themselves: how far each output is apart from one to the next, and their length, s, where that is the same from
-/// period to period: the first one, in which the device comes to its rhythm, does not count, nor what still falls. Of a position that nothing holds, which may be elsewhere in each period, the displacement over `lag` samples is compared.
+/// Periods of a recording with periodic inputs: the difference of each output from one period to the next. Also their length, s, where that is constant.
+/// The first period, in which the device approaches its periodic motion, does not count, nor does a difference that still falls. For a position that
+/// nothing holds, which may drift between periods, the displacement over `lag` samples is compared.
 fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
     let Some(length) = period_of(record) else { return Vec::new() };
     let of = |(o, samples): (usize, &Option<Vec<f64>>)| {
@@ -121,7 +122,7 @@ fn at_times_of(own: &Record, other: &Record, samples: &[f64]) -> Vec<f64> {
     (0..own.len).map(at).collect()
 }
 
-/// Whether an input is the same a second time; one that is 0 throughout says nothing against it.
+/// Whether an input is the same a second time; one that is 0 throughout is no evidence against it.
 fn is_repeated(x: &[f64], y: &[f64]) -> bool {
     let square: f64 = x.iter().map(|x| x * x).sum();
     distance(x, y) <= tuning().recordings.repeated * square
@@ -173,7 +174,7 @@ mod tests {
         // A drift of what nothing holds is no lack of repetition.
         assert!(periods(&drift, &[20]).iter().all(|found| found.1 < 1e-3));
         assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin), &[0]).is_empty());
-        // Of a long and slow input no period of no length is told.
+        // For a long and slow input no period of any length is reported.
         assert!(periods(&record(60_000, 1e-3, |t| (0.02 * t).sin(), f64::sin), &[0]).iter().all(|found| found.2 > 0.0));
         // A rhythm that it comes to over many periods is no lack of repetition either.
         let settling = |t: f64| (std::f64::consts::TAU * t / 0.5).cos() + 0.2 * (-t).exp();

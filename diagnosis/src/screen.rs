@@ -18,7 +18,7 @@ pub struct Promise {
     pub hypothesis: usize,
     /// Values to start a fit from.
     pub values: Vec<f64>,
-    /// Share of the cost that it would take, to first order and with every free number adjusted.
+    /// Share of the cost that it would remove, to first order and with every free parameter adjusted.
     pub share: f64,
     /// Its effects, with what the free parameters can do taken out.
     columns: Vec<Vec<f64>>,
@@ -78,8 +78,8 @@ pub fn worst_records(evaluator: &Evaluator, residuals: &[f64], count: usize) -> 
     order
 }
 
-/// What each hypothesis does to the residuals of a base, so that it can be held against the residual of any later fit: coupled
-/// to the measured motion its effect hardly depends on what else is in the model.
+/// The change of a base's residuals by each hypothesis, so that it can be compared with the residual of any later fit. With the model coupled to the
+/// measured motion, this change hardly depends on the rest of the model.
 pub struct Screen {
     stride: usize,
     effects: Vec<Effect>,
@@ -154,8 +154,9 @@ impl<'b, 'a> Beside<'b, 'a> {
         starts
     }
 
-    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on, at most two of each hypothesis. Half of them are what
-    /// promises most; then comes the best of each other physics, whatever it promises: what does little beside the base may do much beside something else.
+    /// The first of two passes: all starts on the recordings with the largest residuals. The best `most` go on, at most two of each hypothesis. Half of
+    /// them are those with the largest screening value. Then comes the best of each other effect, whatever its value: what does little beside the base may
+    /// do much beside another effect.
     fn first_pass(&self, starts: &[Start<'b>], few: &[usize], most: usize, work: Steps) -> Vec<Start<'b>> {
         let (evaluator, problem, stride) = (self.evaluator, self.evaluator.problem, self.stride);
         let layout = evaluator.layout();
@@ -202,7 +203,7 @@ impl<'b, 'a> Beside<'b, 'a> {
         };
         let values = [start.to_vec(), weakened(&self.hypotheses[index], start)];
         let (full, weak) = (measured(&values[0]), measured(&values[1]));
-        // One residual in so many was kept.
+        // One residual in `stride` was kept.
         let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
         Effect { hypothesis: index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
     }

@@ -25,7 +25,7 @@ pub fn density(samples: &[f64], period: f64) -> (Vec<f64>, Vec<f64>) {
         count += 1.0;
         from += (size / 2).max(1);
     }
-    // The mean was taken off: its line says nothing.
+    // The mean was taken off: its line carries no information.
     (1..sums.len()).map(|k| (k as f64 / (size as f64 * period), sums[k] / count)).unzip()
 }
 

@@ -19,7 +19,7 @@ pub const TWICE: usize = usize::MAX;
 /// A motion that a record starts with: body, position in m, velocity in m/s.
 pub type Start = (usize, f64, f64);
 
-/// An input and its samples, in the place of those of a record.
+/// An input and its samples, which replace those of a record.
 pub type Curve = (usize, Vec<f64>);
 
 /// How a model is run on a record.

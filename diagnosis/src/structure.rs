@@ -1,4 +1,4 @@
-//! A nominal model with some physics added, and every number of it that a fit may move.
+//! A nominal model with some effects added, and every parameter of it that a fit may move.
 
 use crate::coupling::Coupling;
 use crate::hypothesis::Hypothesis;
@@ -12,14 +12,14 @@ use backdrive_plant::set::{Condition, Initial};
 use backdrive_plant::stepper::segments;
 use std::borrow::Cow;
 
-/// What a number of a fit is.
+/// The role of a parameter in a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Role {
-    /// A number that the nominal file states: its place among [`Problem::stated`].
+    /// A parameter that the nominal file states: its place among [`Problem::stated`].
     Stated(usize),
-    /// A parameter of an added physics: which hypothesis, which of its parameters.
+    /// A parameter of an added effect: which hypothesis, which of its parameters.
     Added(usize, usize),
-    /// A number that differs in one record, or in those of a session: path, and the record or the first of them.
+    /// A parameter that differs in one record, or in those of a session: path, and the record or the first of them.
     Condition(String, usize),
     /// Position with which a body starts in a record, m.
     Position(usize, usize),
@@ -30,7 +30,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// The same in the place of another record, where it belongs to one.
+    /// The same for another record, where it belongs to one.
     pub fn in_record(&self, record: usize) -> Role {
         match self {
             Role::Condition(path, _) => Role::Condition(path.clone(), record),
@@ -51,7 +51,7 @@ pub enum Bound {
     High,
 }
 
-/// A number that a fit may move.
+/// A parameter that a fit may move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeParameter {
     /// What it is.
@@ -132,7 +132,7 @@ impl Own<'_> {
     }
 }
 
-/// A nominal model with physics added.
+/// A nominal model with effects added.
 #[derive(Debug, Clone)]
 pub struct Structure {
     /// What is added, in the order in which it is applied.
@@ -183,7 +183,7 @@ impl Structure {
                 if !estimated(condition) {
                     continue;
                 }
-                // The first of a session has the number for all.
+                // The first of a session has the parameter for all.
                 let of = |other: &Record| other.conditions.iter().any(|(p, c)| p == path && c == condition);
                 let session = |r: &usize| matches!(condition, Condition::Shared(_)) && records.get(*r).is_some_and(of);
                 if (0..r).any(|before| session(&before)) {
@@ -212,8 +212,8 @@ impl Structure {
         Structure { added, free }
     }
 
-    /// Values to start from, as they stand in the model: the stated parameters as given, for each hypothesis the values given, and what belongs to
-    /// single records, such as the curve of a hand that nobody measured, as another fit found it.
+    /// Values to start from, in the units of the model: the stated parameters as given, and for each hypothesis the values given. What belongs to single
+    /// records, such as the curve of a hand that nobody measured, is taken from another fit.
     pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>], of_records: &[(Role, f64)]) -> Vec<f64> {
         let own = |role: &Role| of_records.iter().find(|(other, _)| other == role).map(|(_, value)| *value);
         let value = |number: &FreeParameter| match &number.role {
@@ -357,7 +357,7 @@ impl Structure {
     }
 }
 
-/// Whether a number with this condition is estimated.
+/// Whether a parameter with this condition is estimated.
 fn estimated(condition: &Condition) -> bool {
     matches!(condition, Condition::Free | Condition::Shared(_))
 }

@@ -1,5 +1,5 @@
-//! Recordings of very many samples, thinned before a search as far as the device allows: outputs at one sample in so many, as they were measured; a held force as the
-//! straight line of the same impulse and moment over all samples between. What is still too many is cut at the end of each recording.
+//! Recordings of very many samples, thinned before a search as far as the device allows. Outputs keep every n-th sample, unchanged. A held force becomes
+//! the straight line of the same impulse and moment over all samples between. What is still too many is cut at the end of each recording.
 
 use crate::audit::{Remark, Weight};
 use crate::problem::{Problem, Record};
@@ -8,7 +8,7 @@ use crate::tuning::tuning;
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::stepper::{Segment, segments};
 
-/// The problem with as many samples as a search needs, and what was done to it; as it is where it has no more.
+/// The problem with as many samples as a search needs, and what was done to it; unchanged where it has no more.
 pub fn thinned(problem: Problem) -> (Problem, Option<Remark>) {
     let most = tuning().recordings.most_samples;
     let total = samples_of(&problem.fit);
@@ -55,8 +55,8 @@ fn samples_of(records: &[Record]) -> usize {
     records.iter().map(|r| r.len).sum()
 }
 
-/// What taking one sample in so many changes in the prediction of the model as given, root mean square in noise standard deviations, on the beginnings of the longest
-/// recordings; infinite where it cannot be told.
+/// Change of the prediction of the model as given when only every n-th sample is taken: root mean square in noise standard deviations, on the beginnings of
+/// the longest recordings. Infinite where it cannot be computed.
 fn change(problem: &Problem, every: usize) -> f64 {
     if every <= 1 {
         return 0.0;
@@ -81,7 +81,7 @@ fn change(problem: &Problem, every: usize) -> f64 {
     if count > 0 { (sum / count as f64).sqrt() } else { f64::INFINITY }
 }
 
-/// One sample in so many of a recording, as a recording of that period; one of an irregular clock as it is.
+/// Every n-th sample of a recording, as a recording of that period; one of an irregular clock is unchanged.
 fn one_in(model: &Model, record: &Record, every: usize) -> Record {
     if every <= 1 || record.logged.is_some() {
         return record.clone();

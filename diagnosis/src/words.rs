@@ -4,12 +4,12 @@ use crate::hypothesis::Place;
 use crate::physics::physics_named;
 use crate::verdict::types::{Estimate, Finding, Parameter};
 
-/// A physics in words; its name with spaces where the table has none.
+/// An effect in words; its name with spaces where the table has none.
 pub fn physics(name: &str) -> String {
     physics_named(name).map_or_else(|| name.replace('_', " "), |p| p.words.to_string())
 }
 
-/// Where a physics acts, in words: `at the motor`, `between motor and drum`, `at the signal force`.
+/// Where an effect acts, in words: `at the motor`, `between motor and drum`, `at the signal force`.
 pub fn place(place: &Place) -> String {
     match place {
         Place::Between(a, b) if b == "ground" => format!("at the {a}"),
@@ -19,7 +19,7 @@ pub fn place(place: &Place) -> String {
     }
 }
 
-/// A physics at its place in words: `dry friction at the drum`.
+/// An effect at its place in words: `dry friction at the drum`.
 pub fn named(name: &str, at: &Place) -> String {
     format!("{} {}", physics(name), place(at))
 }
@@ -30,7 +30,7 @@ pub fn finding(finding: &Finding) -> String {
     format!("{}{}", named(&finding.physics, &finding.place), size.map_or(String::new(), |size| format!(", {size}")))
 }
 
-/// What explanations that cannot be told apart have in common, and where they differ: `dry friction, at the motor or at the drum`.
+/// What explanations that cannot be separated have in common, and where they differ: `dry friction, at the motor or at the drum`.
 pub fn any_of(all: &[(&str, &Place)]) -> String {
     let unique = |items: Vec<String>| {
         let mut seen: Vec<String> = Vec::new();

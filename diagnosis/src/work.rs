@@ -1,8 +1,8 @@
 //! How much a search computes, counted, so that the same recordings give the same verdict on every machine, busy or not, with any number of threads.
 //!
-//! The unit is one step of a linear network in the stepper, about 25 ns on a laptop. A budget is only asked where all that was begun has been joined, so
-//! that what it says does not depend on which of two threads was faster: tasks that run side by side each count for themselves, and are added up
-//! when their group is done ([`Budget::abreast`]). Seconds end a search only as a limit from outside, and then the budget remembers that they did.
+//! The unit is one step of a linear network in the stepper, about 25 ns on a laptop. A budget is only asked after all started tasks have been joined, so
+//! that its answer does not depend on which of two threads was faster. Parallel tasks each count for themselves, and are added up when their group is done
+//! ([`Budget::abreast`]). Seconds end a search only as a limit from outside, and then the budget remembers that they did.
 
 use crate::tuning::tuning;
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ pub struct Limit<'a> {
     pub deadline: Option<Instant>,
 }
 
-/// Counts work, and says when it has to end.
+/// Counts work, and determines when it has to end.
 #[derive(Debug, Clone)]
 pub struct Budget<'a> {
     spent: Arc<AtomicU64>,
@@ -109,8 +109,8 @@ impl<'a> Budget<'a> {
         self.cut.load(Ordering::Relaxed)
     }
 
-    /// Runs tasks side by side, each with a budget of its own that begins where this one stands. Between groups their work is added up, and none is begun once
-    /// it is used up: in the place of those stands `None`.
+    /// Runs tasks in parallel, each with a budget of its own that begins where this one stands. Between groups their work is added up, and none is begun
+    /// once it is used up: those give `None`.
     pub fn abreast<T: Sync, R: Send>(&self, tasks: &[T], run: impl Fn(&Budget<'a>, &T) -> R + Sync) -> Vec<Option<R>> {
         let mut done = Vec::with_capacity(tasks.len());
         for group in tasks.chunks(tuning().search.abreast.max(1)) {

@@ -1,4 +1,5 @@
-//! What is claimed and what is not: errors that are no physics, numbers that a refit has to find, and a law that is there although more remains.
+//! What is claimed and what is not. Covers errors that are no effect of the device, parameters that a refit has to find, and a law that is there although
+//! more remains.
 
 use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::error_budget::Source;
@@ -169,7 +170,7 @@ fn what_is_late_by_a_small_share_of_a_sample_is_timing_and_no_physics() {
         let said = bench.said(1);
         assert_eq!(said.findings.is_empty(), is_timing, "{delay}: {said:#?}");
         assert_eq!(said.word.is_structure_right(), is_timing, "{delay}: {said:#?}");
-        // It is told, unless stated numbers have taken it up.
+        // It is reported, unless stated parameters have absorbed it.
         assert!(said.audit.iter().all(|remark| remark.what == "timing") && (is_timing || said.audit.is_empty()), "{:#?}", said.audit);
     }
 }
@@ -193,7 +194,7 @@ fn dry_friction_is_claimed_although_more_remains() {
     assert_eq!(first.physics, "coulomb", "{said:#?}");
     let Parameter::One(force) = &first.parameters["force"] else { panic!("{first:#?}") };
     assert!((force.value - 0.9).abs() < 0.09, "{force:?}");
-    // What remains is told beside it, and what to do about it.
+    // The remaining residual is reported with it, and what to do about it.
     let left = said.remaining.as_ref().unwrap();
     assert!(left.noise_sd.unwrap() > 3.0 && left.shows.is_some(), "{left:#?}");
     assert!(said.next_experiment.is_some());
@@ -206,10 +207,10 @@ fn an_input_that_runs_on_between_its_samples_is_no_missing_physics() {
     let done = diagnose(bench.problem(1), &Settings::default(), None, &|_| {}).unwrap();
     assert!(done.verdict.word.is_structure_right() && done.verdict.findings.is_empty(), "{:#?}", done.verdict);
     assert!(done.remarks.iter().any(|remark| remark.about == "hold" && remark.signal == "push"), "{:#?}", done.remarks);
-    // What is written of the model simulates as it was simulated here.
+    // The model's text simulates as the model was simulated here.
     let written = Model::from_toml(&done.problem.text, "written").unwrap();
     assert_eq!((written.inputs[0].hold, done.problem.model.inputs[0].hold), (Hold::Linear, Hold::Linear));
-    // What the file says is not asked for again.
+    // What the file states is not asked for again.
     let stated = CHAIN.replace("on = \"a\"\n", "on = \"a\"\nhold = \"linear\"\n");
     let problem = Bench { nominal: &stated, ..bench }.problem(1);
     assert!(hold::assumed(&problem).is_empty());
@@ -256,7 +257,7 @@ kind = "velocity"
 of = "carriage"
 "#;
 
-/// While a body only moves one way, dry friction and a constant force are one number; once it also moves back they are not.
+/// While a body only moves one way, dry friction and a constant force are one parameter; once it also moves back they are not.
 #[test]
 fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_proposed() {
     let truth = format!("{PUSHED}\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"carriage\", \"ground\"]\nforce = 0.6\n");
@@ -276,7 +277,7 @@ fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_pro
     let Some(NextExperiment::Planned(plan)) = &said.next_experiment else { panic!("{:?}", said.next_experiment) };
     assert!(plan.sensor.is_none() && plan.separation_sd.is_some_and(|sd| sd >= 1.5), "{plan:?}");
 
-    // The same as it is played, twice: once to fit, once held out.
+    // The same excitation applied twice: once to fit, once held out.
     let excitation: Excitation = plan.excitation.parse().unwrap();
     let played = excitation.samples(plan.rate_hz).unwrap();
     let mut problem = bench.problem(5);

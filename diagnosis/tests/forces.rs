@@ -47,7 +47,7 @@ fn waves(all: &'static [(f64, f64, f64)]) -> Motion {
     })
 }
 
-/// What a diagnosis says of recordings of 12 s, of which every one begins with a rest of so many seconds in which nothing is exactly 0 but everything.
+/// Diagnosis of recordings of 12 s. Each begins with a rest of `rest_s` seconds, in which the torque and the motion are exactly constant.
 fn said(hidden: impl Fn([f64; 3]) -> f64, noise: f64, rest_s: f64, step: f64) -> Verdict {
     let model = Model::from_toml(NOMINAL, "lever.toml").unwrap();
     let motions: [Motion; 3] = [

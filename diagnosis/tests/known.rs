@@ -1,4 +1,4 @@
-//! Devices of known physics: what was left out is named, and nothing is named where nothing was.
+//! Devices with known effects: a missing one is named, and nothing is named where nothing is missing.
 
 use backdrive_diagnosis::compare::unseen;
 use backdrive_diagnosis::evaluator::Evaluator;
@@ -121,7 +121,7 @@ fn refitted_numbers_lie_in_their_intervals() {
     }
 }
 
-/// What a search says of a problem.
+/// Verdict and files of a search on a problem.
 fn said(problem: &Problem, settings: &Settings) -> (Verdict, Files) {
     let found = search(problem, settings, Limit::default(), &|_| {}).unwrap();
     verdict(problem, &found, &[], None, Limit::default()).unwrap()
@@ -220,7 +220,7 @@ fn a_drift_in_what_no_fit_has_seen_counts_but_once() {
     let held = |problem: &Problem| unseen(problem, &problem.held_out, &structure, &values, &noise_sd).unwrap();
     let noise = held(&problem);
     assert!(noise.mean_square < 1.2 && noise.correlation_time < 1.3, "{noise:?}");
-    // Half a period of a wave of six floors over the whole of the recording: one observation, or a few.
+    // Half a period of a wave of six noise standard deviations over the whole of the recording: one observation, or a few.
     let samples = problem.held_out[0].outputs[0].as_mut().unwrap();
     let length = samples.len() as f64;
     samples.iter_mut().enumerate().for_each(|(i, y)| *y += 6.0 * noise_sd[0] * (std::f64::consts::PI * i as f64 / length).cos());
@@ -252,7 +252,7 @@ of = "slide"
 
 const RIPPLE: &str = "\n[[elements]]\nname = \"teeth\"\nkind = \"cogging\"\nbetween = [\"slide\", \"ground\"]\namplitude = 0.8\nperiod = 4e-3\nphase = 0.5\n";
 
-/// The slide with teeth, moved to and fro; in the two recordings that no fit has seen its encoder counts from another place.
+/// The slide with teeth, moved to and fro; in the two held-out recordings its encoder counts from another zero.
 fn switched_on_again(condition: Option<Condition>) -> Problem {
     let truth = Model::from_toml(&format!("{SLIDE}{RIPPLE}"), "truth").unwrap();
     let nominal = Model::from_toml(SLIDE, "nominal").unwrap();
@@ -291,7 +291,7 @@ fn where_an_encoder_counts_from_is_a_number_of_its_session() {
     assert!((period / 4e-3 - 1.0).abs() < 1e-3, "{period}");
     assert!(said.held_out.nrmse_after.unwrap() < 1.1 * said.held_out.noise_floor.unwrap(), "{said:#?}");
 
-    // One number for the session, and one each where files are free by themselves.
+    // One parameter for the session, and one each where files are free by themselves.
     for (condition, own) in [(Condition::Shared(0), 1), (Condition::Free, 2)] {
         let problem = switched_on_again(Some(condition));
         let structure = Structure::new(&problem, &problem.held_out, Vec::new());

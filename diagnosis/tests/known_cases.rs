@@ -1,4 +1,5 @@
-//! Small inputs that were once answered wrongly, kept beside the project: each has to come out as its `expect.md` says. Without them there is nothing to test.
+//! Small inputs that were once answered wrongly, kept beside the project: each must give the result in its `expect.md`. Without them there is nothing to
+//! test.
 
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
@@ -28,7 +29,7 @@ fn diagnosed(folder: &Path) -> Diagnosis {
     diagnose(problem, &Settings::default(), None, &|_| ()).unwrap()
 }
 
-/// A parameter of the finding of this physics.
+/// A parameter of the finding of this effect.
 fn number(found: &Diagnosis, physics: &str, key: &str) -> f64 {
     let all = &found.verdict.findings;
     let finding = all.iter().find(|f| f.physics == physics).unwrap_or_else(|| panic!("no {physics}: {}", found.verdict.sentence));
@@ -141,7 +142,7 @@ fn the_start_of_a_held_out_swing_stands_in_its_first_samples() {
     let Some(folder) = case("37-start-of-held-out-swing-not-found") else { return };
     let problem = Problem::open(&folder.join("set.toml"), None).unwrap();
     let structure = Structure::new(&problem, &problem.fit, Vec::new());
-    // The true numbers, by the case's generator.
+    // The true parameters, by the case's generator.
     let known = |path: &str| if path == "elements.dry.force" { 1.0e-3 } else { f64::NAN };
     let stated: Vec<f64> = problem.stated.iter().map(|s| if known(&s.path).is_nan() { s.given } else { known(&s.path) }).collect();
     let values = structure.values(&problem, &stated, &[], &[]);

@@ -6,13 +6,13 @@ use crate::score::{Finding, Mark};
 use backdrive_diagnosis::verdict::Word;
 use serde_json::{Value, json};
 
-/// Noise floors from which on an effect counts as one that shows.
+/// Least refitted error at which an effect counts as shown, in standard deviations of the sensor noise.
 pub const SHOWS: f64 = 3.0;
 
 /// What a user has without a diagnosis: the honest measure of a canceller is its stable gain over the best of these.
 const OTHERS: [&str; 3] = ["none", "second order", "linear, refitted"];
 
-/// Kinds of physics, by the names of the hidden laws.
+/// Kinds of effects, by the names of the hidden laws.
 pub const KINDS: [(&str, &[&str]); 3] = [
     ("dry friction", &["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "load_friction", "warm_friction", "gear_loss"]),
     ("hysteresis", &["hysteretic_spring", "bouc_wen", "dahl", "lugre", "maxwell_slip", "preisach_lugre", "bristle_field"]),
@@ -26,7 +26,7 @@ pub struct Case {
     pub name: String,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
-    /// Whether the nominal numbers were refitted to a session of the hidden plant first.
+    /// Whether the nominal parameters were refitted to a session of the hidden plant first.
     pub refitted: bool,
     /// SHA-256 of the truth, as printed before anything was recorded.
     pub sealed: String,
@@ -42,15 +42,15 @@ pub struct Case {
     pub marks: Vec<Mark>,
     /// Whether something nonlinear was concealed.
     pub nonlinear: bool,
-    /// Error on recordings that no fit has seen, as shares of their deviation: as given, refitted, diagnosed.
+    /// Error on held-out data, as shares of their deviation: as given, refitted, diagnosed.
     pub held_out: [Option<f64>; 3],
-    /// The refitted one of these over the noise floor: how far the recordings are from what the nominal model with other numbers can do.
+    /// The refitted one of these over the noise floor: how far the recordings are from any prediction of the nominal model with other parameters.
     pub refit_floors: Option<f64>,
     /// Stable mu*lambda by canceller and grip.
     pub gains: Vec<Gain>,
     /// Time that the loop with the canceller that estimates the hand takes to settle after a change of the grip, at half its stable gain, s: the median.
     pub recovery_s: Option<f64>,
-    /// The live graph at gains about the edges without a canceller and with the diagnosed and the chosen one.
+    /// The live graph at gains about the critical gains without a canceller and with the diagnosed and the chosen one.
     pub live: Vec<LiveRun>,
     /// Share of the diagnosed estimate that was chosen where the grip is uncertain, 0 for no canceller; `None` where no gain was raised.
     pub share: Option<f64>,
@@ -85,15 +85,15 @@ impl Case {
         hands
     }
 
-    /// What kind of physics is concealed first: dry friction, hysteresis, backlash, something else; `None` where nothing is.
+    /// What kind of effect is concealed first: dry friction, hysteresis, backlash, something else; `None` where nothing is.
     pub fn kind(&self) -> Option<&'static str> {
         let name = self.concealed.first()?.split(' ').next()?;
         let kind = KINDS.iter().find(|(_, names)| names.contains(&name));
         Some(kind.map_or("other physics", |(kind, _)| kind))
     }
 
-    /// Whether the recordings show what is concealed: the nominal model, with whatever numbers fit best, stays [`SHOWS`] noise floors and more away
-    /// from recordings that no fit has seen. Below that its numbers take the effect on.
+    /// Whether the recordings show what is concealed: the error of the nominal model on held-out data, with any refit, is at least [`SHOWS`] standard
+    /// deviations of the sensor noise. Below that its parameters absorb the effect.
     pub fn shows(&self) -> bool {
         self.refit_floors.is_none_or(|floors| floors >= SHOWS)
     }

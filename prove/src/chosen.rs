@@ -1,9 +1,9 @@
 //! How much of a diagnosed model's estimate is subtracted where the grip is uncertain, and the explanation too. No truth is needed: the diagnosed
 //! model is the master, and so are its rivals, which explain the recordings nearly as well.
 //!
-//! A hand that grips more firmly than the model says moves less, so that the whole estimate takes out too much and the loop runs away
-//! where it would not have without any canceller. Of several shares of the estimate, and of no canceller, that one is chosen whose stable gain
-//! is largest for the worst of the grips and explanations.
+//! A hand that grips more firmly than the model assumes moves less. The whole estimate then subtracts too much, and the loop runs away where it would not
+//! have without any canceller. Of several shares of the estimate, and of no canceller, that one is chosen whose stable gain is largest for the worst of the
+//! grips and explanations.
 
 use super::edges::{Canceller, Loop, Moved};
 use crate::error::ProveError;
@@ -21,7 +21,7 @@ const BETTER: f64 = 1.05;
 
 /// How firmly the hand may hold a model, about the grip of the session, where the canceller estimates it.
 const HELD: [f64; 3] = [0.5, 1.0, 2.0];
-/// A stable gain above this share of the one without a canceller is not below it: both edges are known to 3 per cent only.
+/// A stable gain above this share of the one without a canceller is not below it: both critical gains are known to 3 per cent only.
 pub const AS_GOOD: f64 = 0.94;
 
 /// The canceller that estimates the hand, with what the loop bears without one, whichever of the `models` the device is and however firmly it is held. `None` where it

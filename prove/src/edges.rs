@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Where edges are looked for: to 50, coarser than `stability` does, for there are many. With the grip of the session, where the live graph is asked too,
-/// the loop is also looked at about the edge, since noise and dry friction make verdicts flicker there.
+/// Range of the search for critical gains: to 50, coarser than `stability` does, for there are many. With the grip of the session the live graph is asked
+/// too. There the loop is also examined about the critical gain, since noise and dry friction make verdicts flicker there.
 const SEARCH: Search =
     Search { lowest: 0.05, floor: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
 
@@ -30,7 +30,7 @@ pub struct Canceller {
 }
 
 impl Canceller {
-    /// One that takes the hand as the file says.
+    /// One that takes the hand from the file.
     pub fn fixed(name: &'static str, model: Option<PathBuf>, grip: Option<PathBuf>) -> Canceller {
         Canceller { name, model, grip, estimates_hand: false, edge_without: None }
     }
@@ -76,7 +76,7 @@ impl Loop<'_> {
         }
     }
 
-    /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
+    /// The critical gain with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
     pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, ProveError> {
         let scenario = self.scenario(canceller, firmness)?;
         let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
@@ -107,7 +107,7 @@ impl Loop<'_> {
     }
 }
 
-/// Of runs as long as this the edge is not looked at again from both sides, s.
+/// Least length of a run for which the critical gain is not checked again from both sides, s.
 const LONG_S: f64 = 8.0;
 
 /// Numbers of runs of the hidden plant from this on are of runs at a gain.

@@ -24,7 +24,7 @@ pub struct Worse {
     pub none: f64,
 }
 
-/// A live run that did something else than the stability limit says.
+/// A live run whose outcome differs from the prediction of the stability limit.
 #[derive(Debug, Clone, Serialize)]
 pub struct Otherwise {
     /// The case.

@@ -1,4 +1,4 @@
-//! Whether the live graph agrees: processes over shared memory with the hidden plant in the master's place, just below an edge and just above it.
+//! Whether the live graph agrees: processes over shared memory with the hidden plant in the master's place, just below a critical gain and just above it.
 
 use super::edges::{Canceller, Loop};
 use super::files::{absolute, ours, write};
@@ -11,8 +11,8 @@ use serde_json::Value;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, value};
 
-/// Where the live graph is run, as factors on the highest gain found stable and on the lowest found not stable; where verdicts flicker about the edge, on the
-/// ends of that range.
+/// Where the live graph is run, as factors on the highest gain found stable and on the lowest found not stable. Where verdicts flicker about the critical
+/// gain, the factors apply to the ends of that range.
 const BELOW: f64 = 0.9;
 const ABOVE: f64 = 1.15;
 
@@ -23,14 +23,14 @@ pub struct LiveRun {
     pub canceller: &'static str,
     /// mu*lambda.
     pub gain: f64,
-    /// Whether the edge lies above this gain, so that the run should be stable.
+    /// Whether the critical gain lies above this gain, so that the run should be stable.
     pub below_edge: bool,
     /// What the run did: `stable`, `limit_cycle`, `unstable`, `limited`, `cannot_tell`.
     pub outcome: String,
 }
 
 impl LiveRun {
-    /// Whether it did what the edge says.
+    /// Whether its outcome agrees with the critical gain.
     pub fn agrees(&self) -> bool {
         // A run that was not judged agrees with nothing.
         self.outcome != "cannot_tell" && (self.outcome == "stable") == self.below_edge
@@ -54,7 +54,7 @@ pub(crate) fn hide(graph: &mut DocumentMut, backdrive: &Path, hidden: &Hidden, n
     Ok(())
 }
 
-/// Runs the live graph about an edge. Files stay in `folder`.
+/// Runs the live graph about a critical gain. Files stay in `folder`.
 ///
 /// # Errors
 /// A file that cannot be written, or a run that cannot be done.

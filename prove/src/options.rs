@@ -13,7 +13,7 @@ pub struct Options {
     pub cases: usize,
     /// Conceal only what no linear model can imitate.
     pub nonlinear: bool,
-    /// Folder of the cases; a truth that is there already is not drawn anew.
+    /// Folder of the cases; a truth that is there already is not drawn again.
     pub out: PathBuf,
     /// The nominal master.
     pub model: PathBuf,
@@ -76,7 +76,7 @@ impl Operator {
 /// Which cases have a nominal model that was refitted to the hidden plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Nominal {
-    /// None: its numbers are off as they were drawn.
+    /// None: its parameters are off as they were drawn.
     Given,
     /// All.
     Refitted,

@@ -31,7 +31,7 @@ pub struct Draw {
     pub effects: usize,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
-    /// Whether the nominal numbers are refitted to a session of the hidden plant first.
+    /// Whether the nominal parameters are refitted to a session of the hidden plant first.
     pub refitted: bool,
 }
 
@@ -146,7 +146,7 @@ fn cancellers(
     Ok((cancellers, Some(chosen.share)))
 }
 
-/// An error on recordings that no fit has seen, over the noise floor.
+/// An error on held-out data, in standard deviations of the sensor noise.
 fn floors(error: Option<f64>, verdict: &Verdict) -> Option<f64> {
     error.zip(verdict.held_out.noise_floor).map(|(left, floor)| left / floor).filter(|x| x.is_finite())
 }
@@ -247,7 +247,7 @@ fn all_cancellers(options: &Options, folder: &Path, nominal: &Nominal, session: 
     ])
 }
 
-/// The nominal model of a session with its numbers fitted to that.
+/// The nominal model of a session with its parameters fitted to that.
 fn refit(options: &Options, folder: &Path, name: &str, session: &Path, out: &Path) -> Result<(), ProveError> {
     ours(&options.backdrive, folder, name, &[&"fit", &session.join("model.toml"), &session, &"--out", &out]).map(drop)
 }

@@ -17,7 +17,7 @@ use std::sync::atomic::Ordering;
 /// Cancellers that are compared with other hands than the session's.
 const WITH_OTHER_HANDS: [&str; 6] = ["none", "second order", "linear, refitted", "diagnosed", "chosen", ESTIMATED];
 
-/// Cancellers whose edges the live graph confirms.
+/// Cancellers whose critical gains the live graph confirms.
 const LIVE: [&str; 4] = ["none", "diagnosed", "chosen", ESTIMATED];
 
 /// Share of its stable gain at which it is looked how soon the loop settles after a change of the grip.
@@ -27,13 +27,13 @@ const RECOVERS_AT: f64 = 0.5;
 pub struct Raised {
     /// By canceller and hand.
     pub gains: Vec<Gain>,
-    /// The live graph about some of the edges.
+    /// The live graph about some of the critical gains.
     pub live: Vec<LiveRun>,
     /// Median time to settle after a change of the grip with the hand estimated, s.
     pub recovery_s: Option<f64>,
 }
 
-/// Raises the gain with every canceller and hand, the hidden plant being the master; runs the live graph about some of the edges.
+/// Raises the gain with every canceller and hand, the hidden plant being the master; runs the live graph about some of the critical gains.
 ///
 /// # Errors
 /// A file that cannot be read or written, or a run that cannot be done.

@@ -14,8 +14,8 @@ const LEAST_FORCE: f64 = 0.02;
 /// What is looked at after the hand has changed its grip, s.
 const AFTER_S: f64 = 1.2;
 
-/// The median time, s, after which the force of what the slave touches has settled after each change of the grip, at the gain `gain` (mu*lambda); the
-/// hand's own move that begins with a change is part of it. `None` where nothing changes or the loop runs away.
+/// Settling time after a change of the grip, s, at the gain `gain` (mu*lambda): the median over the changes. It ends when the force of what the slave
+/// touches has settled, and includes the hand's own move that begins with a change. `None` where nothing changes or the loop runs away.
 ///
 /// # Errors
 /// A run that cannot be done.

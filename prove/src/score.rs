@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A finding of a verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Name of the physics.
+    /// Name of the effect.
     pub physics: String,
     /// Bodies, or a signal.
     pub place: Vec<String>,
@@ -56,12 +56,12 @@ fn sits_at(finding: &Finding, site: &Site) -> bool {
 pub struct Handed {
     /// Whether nobody measured the hand.
     pub hand_hidden: bool,
-    /// Whether the nominal numbers had been refitted before.
+    /// Whether the nominal parameters had been refitted before.
     pub refitted: bool,
 }
 
-/// Marks a verdict's findings for an effect. Where it can only be told from the model's numbers, or from what an unmeasured hand may do, the
-/// right verdict names nothing; and where those numbers were refitted before, they may be right already.
+/// Marks a verdict's findings for an effect. Where it can only be distinguished by the model's parameters, or by what an unmeasured hand may do, the right
+/// verdict names nothing. Where those parameters were refitted before, they may be right already.
 pub fn mark(effect: &Effect, word: Word, findings: &[Finding], handed: Handed) -> Mark {
     let possible = || effect.accept.iter().filter(|answer| handed.hand_hidden || !answer.hand_hidden);
     let says = |name: &str| name == word.name() || handed.refitted && name == Word::Parameters.name() && word == Word::NothingMissing;

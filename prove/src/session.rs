@@ -6,8 +6,8 @@ use backdrive_bags::{BagHeader, Reader, without};
 use std::path::Path;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, Value, value};
 
-/// Copies a recorded session without what tells how the hidden plant was run: its command line, and where the user's body was. Where the hand
-/// is not shown, what it wanted is left out too, and the set says that it is unknown up to `hand_hz`.
+/// Copies a recorded session without what reveals how the hidden plant was run: its command line, and where the user's body was. Where the hand is not
+/// shown, what it wanted is left out too, and the set declares it unknown up to `hand_hz`.
 pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64) -> Result<(), ProveError> {
     std::fs::create_dir_all(session).map_err(|e| ProveError::write(session, e))?;
     let mut names: Vec<_> = std::fs::read_dir(recorded)

@@ -38,15 +38,15 @@ pub struct Summary {
     /// Of all effects.
     #[serde(flatten)]
     pub all: Found,
-    /// Of those that show in recordings after the nominal model's numbers were fitted anew ([`Case::shows`]).
+    /// Of those that show in recordings after the nominal model's parameters were refitted ([`Case::shows`]).
     pub showing: Found,
     /// Cases that conceal nothing and in which something was named.
     pub false_alarms: Share,
-    /// Runs of the live graph about the edges that did what these say.
+    /// Runs of the live graph about the critical gains whose outcome agreed with these.
     pub live: Share,
     /// What was concealed, what was said first, how often. `nothing` stands for no effect and no finding.
     pub confusion: Vec<(String, String, usize)>,
-    /// What cancellers are worth, by what is concealed: each kind of physics, then all that is nonlinear and all that is linear.
+    /// What cancellers are worth, by what is concealed: each kind of effect, then all that is nonlinear and all that is linear.
     pub worth: Vec<Group>,
 }
 

@@ -1,4 +1,4 @@
-//! Who watches a proof: is told what is done and what came of it, and may stop it.
+//! Who watches a proof: receives each step and its result, and may stop it.
 
 use crate::case::Case;
 use crate::error::ProveError;
@@ -16,13 +16,13 @@ pub trait Watch {
     /// A truth was drawn and sealed; the sentence holds its digest.
     ///
     /// # Errors
-    /// It cannot be told.
+    /// It cannot be reported.
     fn sealed(&self, sentence: &str) -> Result<(), ProveError>;
 
     /// A case has ended, by itself or with an error; `cases` are all that are done.
     ///
     /// # Errors
-    /// It cannot be told or kept.
+    /// It cannot be reported or kept.
     fn ended(&self, last: Result<&Case, &ProveError>, cases: &[Case]) -> Result<(), ProveError>;
 }
 

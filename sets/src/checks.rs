@@ -29,8 +29,8 @@ pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
     Ok(notes)
 }
 
-/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into: the samples
-/// that the model takes are the same, bit for bit.
+/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into. The test is that the
+/// samples that the model takes are the same, bit for bit.
 pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
     let moves = |record: &Record| record.inputs.iter().chain(record.outputs.iter().flatten()).any(|s| s.iter().any(|x| *x != s[0]));
     let same = |a: &Record, b: &Record| a.inputs == b.inputs && a.outputs == b.outputs && moves(a);
@@ -54,7 +54,7 @@ fn overlap(set: &RecordingSet, first: &str, second: &str) -> bool {
     from_a < to_b && from_b < to_a && a.keep == b.keep
 }
 
-/// Whether two paths lead to one file, or to files of the same bytes. What cannot be read is told where it is used.
+/// Whether two paths lead to one file, or to files of the same bytes. What cannot be read is reported where it is used.
 pub(crate) fn same_data(first: &Path, second: &Path) -> bool {
     if is_same_file(first, second) {
         return true;
@@ -109,7 +109,7 @@ fn is_hand(name: &str) -> bool {
     name.ends_with(".hand") || name.ends_with("_hand")
 }
 
-/// Signals of one file that are neither the model's nor named by the set; none of a file that cannot be read, which is told elsewhere.
+/// Signals of one file that are neither the model's nor named by the set. None of a file that cannot be read: another check reports that.
 fn unused_in(set: &RecordingSet, file: &str, model: &Model) -> Vec<String> {
     let path = set.path_of(file);
     let own = signals_of(model);

@@ -8,7 +8,7 @@ use backdrive_plant::model::Model;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What an experiment records: the device as held, its grip a part of the model, or the specimen of a rig, and where each signal is told.
+/// What an experiment records: the device as held, its grip a part of the model, or the specimen of a rig, and the topic and field of each signal.
 pub struct Device {
     model: Model,
     /// Signal, topic, field.
@@ -87,7 +87,7 @@ impl Device {
         Some(Device { model, columns })
     }
 
-    /// The specimen, moved as the ram moved and pushed as the load cell says.
+    /// The specimen, moved as the ram moved and pushed with the force of the load cell.
     fn on_rig(graph: &Graph, index: usize) -> Result<Device, SetError> {
         let Settings::Rig(DeviceFiles { fragment: Some(specimen), .. }, ..) = &graph.nodes[index].settings else {
             return Err(SetError::new(format!("{}: experiments need a specimen on the rig", graph.path.display())));
@@ -133,7 +133,7 @@ pub struct Set {
     pub fit: Vec<String>,
     /// And of those that no fit sees.
     pub held_out: Vec<String>,
-    /// Per file, what is another number there than in the model: path and value.
+    /// Per file, the parameters that differ from the model there: path and value.
     conditions: Vec<(String, Vec<(String, f64)>)>,
 }
 
@@ -144,10 +144,10 @@ impl Set {
         Set { folder, model, columns, fit: Vec::new(), held_out: Vec::new(), conditions: Vec::new() }
     }
 
-    /// Adds an experiment's recording. It must be of the set's device, in which single numbers may differ.
+    /// Adds an experiment's recording. It must be of the set's device, in which single parameters may differ.
     ///
     /// # Errors
-    /// More than single numbers differ.
+    /// More than single parameters differ.
     pub fn add(&mut self, experiment: &Experiment, device: &Device) -> Result<(), String> {
         let file = format!("{}.mcap", experiment.name);
         let conditions = differences(&self.model, &device.model).filter(|_| self.columns == device.columns);
@@ -180,7 +180,7 @@ impl Set {
     }
 }
 
-/// Numbers of bodies and elements that `other` has in place of `model`'s; `None` where more than single numbers differ.
+/// Parameters of bodies and elements that `other` has instead of `model`'s; `None` where more than single parameters differ.
 fn differences(model: &Model, other: &Model) -> Option<Vec<(String, f64)>> {
     let mut alike = model.clone();
     let mut found = Vec::new();

@@ -22,7 +22,7 @@ pub struct Opened {
     pub files: Vec<PathBuf>,
 }
 
-/// Opens a set, a folder of recordings, or recordings. Where nothing says what is held out, the last of several recordings is.
+/// Opens a set, a folder of recordings, or recordings. Where nothing states what is held out, the last of several recordings is.
 /// A grip is put on the axes of the model; `none` is no hand. `ignored` are recorded inputs that may be left out.
 ///
 /// # Errors
@@ -65,7 +65,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     Ok(Opened { problem, name, notes, files })
 }
 
-/// The set that paths name, and whether it says itself what is fitted.
+/// The set that paths name, and whether it states itself what is fitted.
 ///
 /// # Errors
 /// When a file or folder is not there, or the set cannot be read.
@@ -90,7 +90,7 @@ pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), SetError> {
 pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
     if set.held_out.is_empty() {
         match set.fit.len() {
-            // Who says in a set.toml what is fitted means it.
+            // Where a set.toml states what is fitted, that is not changed.
             _ if told => notes.push(
                 "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
                     .to_string(),
@@ -122,8 +122,8 @@ fn held(model: &Path, grip: &Path) -> Result<String, SetError> {
     Ok(held.to_toml())
 }
 
-/// What is wrong with a bag whose recording did not come to its end; `None` where nothing is, and for what is no bag. What cannot be read
-/// at all is told when it is used.
+/// What is wrong with a bag whose recording did not come to its end; `None` where nothing is, and for what is no bag. What cannot be read at all is
+/// reported when it is used.
 fn unfinished(path: &Path) -> Option<String> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
         return None;
@@ -137,7 +137,7 @@ fn unfinished(path: &Path) -> Option<String> {
     if !reader.ended_cleanly() {
         return Some(format!("{name} was not closed: {recover}"));
     }
-    // A bag of its own, whatever it says of itself: by its messages.
+    // A bag of its own, whatever its header states: by its messages.
     let faults = Account::of(&reader).ok()?.faults;
     let (first, more) = (faults.first()?, faults.len() - 1);
     let others = if more > 0 { format!(", and {more} more: `backdrive bag info --check {name}` says all") } else { String::new() };

@@ -21,8 +21,8 @@ pub struct Butterworth {
 }
 
 impl Butterworth {
-    /// Order 1 to [`MOST_ORDER`] (cut to it), corner in Hz (-3 dB) below half the rate; a corner that is not above 0 or not below half the
-    /// rate lets everything pass. The bilinear image, with the corner kept where it is.
+    /// Order 1 to [`MOST_ORDER`] (cut to it), corner in Hz (-3 dB) below half the rate. A corner that is not above 0 or not below half the rate lets
+    /// everything pass. The bilinear image, with the corner kept where it is.
     pub fn new(order: usize, corner_hz: f64, period_s: f64) -> Butterworth {
         let order = order.clamp(1, MOST_ORDER);
         let mut sections = Vec::new();
@@ -47,7 +47,7 @@ impl Butterworth {
         Butterworth { sections, begun: false }
     }
 
-    /// Whether everything passes as it is.
+    /// Whether every signal passes unchanged.
     pub fn passes_all(&self) -> bool {
         self.sections.is_empty()
     }
@@ -71,8 +71,8 @@ impl Butterworth {
     }
 }
 
-/// A signal forward and backward through a filter that has not begun, which begins at rest on the first value of each way: nothing is
-/// delayed, and the response counts twice.
+/// A signal forward and backward through a filter that has not begun, which begins at rest on the first value of each way. Nothing is delayed, and the
+/// response counts twice.
 pub fn both_ways(filter: &Butterworth, signal: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let (mut there, mut back) = (filter.clone(), filter.clone());
     let mut values: Vec<f64> = signal.into_iter().map(|x| there.step(x)).collect();

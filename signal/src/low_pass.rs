@@ -17,8 +17,8 @@ impl LowPass {
         LowPass { order, filter: Butterworth::new(order, corner, 1.0 / rate) }
     }
 
-    /// The samples filtered forward and backward. The filter begins and ends on a piece of the signal turned about its end, as `sosfiltfilt`
-    /// of SciPy; samples of which there are too few for that pass as they are.
+    /// The samples filtered forward and backward. The filter begins and ends on a piece of the signal turned about its end, as `sosfiltfilt` of SciPy.
+    /// Samples of which there are too few for that pass unchanged.
     pub fn both_ways(&self, samples: &[f64]) -> Vec<f64> {
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Vec::new() };
         if self.filter.passes_all() || samples.len() < 10 * self.order.div_ceil(2) {

@@ -113,7 +113,7 @@ pub enum Hand {
 }
 
 impl Hand {
-    /// As a graph file says it.
+    /// Its word in a graph file.
     fn word(self) -> &'static str {
         match self {
             Hand::AsModelled => "as_modelled",
@@ -132,7 +132,7 @@ pub enum Sensors {
 }
 
 impl Sensors {
-    /// As a graph file says it.
+    /// Its word in a graph file.
     fn word(self) -> &'static str {
         match self {
             Sensors::AsModelled => "as_modelled",
@@ -151,7 +151,7 @@ pub enum Limits {
 }
 
 impl Limits {
-    /// As a graph file says it.
+    /// Its word in a graph file.
     fn word(self) -> &'static str {
         match self {
             Limits::Enforced => "enforced",
@@ -243,7 +243,7 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// As a graph file says it.
+    /// Its word in a graph file.
     fn word(self) -> &'static str {
         match self {
             Clock::Lockstep => "lockstep",

@@ -1,4 +1,4 @@
-//! What a diagnosis says beside its verdict: what to do next.
+//! What a diagnosis reports beside its verdict: what to do next.
 
 use crate::failure::Failure;
 use crate::offered::{Step, lines};

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is told there.
+/// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is reported there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>, Failure> {
     let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     let Some(model) = options.model.clone().or_else(|| set.model.clone()) else { return Ok(None) };
@@ -38,7 +38,7 @@ pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>,
     Ok(Some((set, model)))
 }
 
-/// Diagnoses an arm, writes, and says what was found. `report`: where the page goes, where one is wanted.
+/// Diagnoses an arm, writes, and prints what was found. `report`: where the page goes, where one is wanted.
 pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, report: Option<&Path>, began: Instant) -> Result<Word, Failure> {
     let files: Vec<PathBuf> =
         std::iter::once(model.to_path_buf()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
@@ -47,7 +47,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     }
     let mut notes = arm_options::notes(options, set)?;
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
     let stop = interrupt::heard()?;
@@ -168,7 +168,7 @@ fn text(problem: &Problem, found: &Found) -> String {
             );
         }
     }
-    // Where nothing else is claimed the sentence says it.
+    // Where nothing else is claimed the sentence states it.
     let beside = verdict.arm.iter().filter(|_| verdict.word != Word::Unexplained);
     for joint in beside.flat_map(|arm| &arm.joints) {
         if let Some(open) = unexplained(joint) {

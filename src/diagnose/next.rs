@@ -18,7 +18,7 @@ const CONTACT: &str = "launch/contact.toml";
 pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
     let held = &found.verdict.held_out;
     let model = out.join(MODEL_FILE);
-    // A canceller takes the model of a master: one that says where it is held, pushed and read.
+    // A canceller takes the model of a master: one that states where it is held, pushed and read.
     let is_master = !found.problem.model.axes.is_empty();
     let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
     let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));

@@ -19,7 +19,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is told there.
+/// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is reported there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, Option<PathBuf>)>, Failure> {
     let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     if !is_servo(&set) {
@@ -32,7 +32,7 @@ pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, Option<Pat
     Ok(Some((set, model)))
 }
 
-/// Diagnoses servo joints, writes, and says what was found. `report`: where the page goes, where one is wanted.
+/// Diagnoses servo joints, writes, and prints what was found. `report`: where the page goes, where one is wanted.
 pub fn diagnose(
     options: &cli::Diagnose,
     set: &RecordingSet,
@@ -49,7 +49,7 @@ pub fn diagnose(
     let files: Vec<PathBuf> =
         model.map(Path::to_path_buf).into_iter().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     open::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
-    // What cannot be written is told before the work, not after it.
+    // What cannot be written is reported before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
     let problem = Problem::open(set, model).map_err(Failure::input)?;
@@ -144,7 +144,7 @@ fn text(problem: &Problem, found: &Found) -> String {
     out.trim_end().to_string()
 }
 
-/// A finding with its numbers.
+/// A finding with its parameters.
 fn finding_text(finding: &Finding) -> String {
     let numbers: Vec<String> = finding
         .parameters

@@ -13,7 +13,7 @@ use backdrive_report::percent;
 use error_without::{Errors, errors};
 use serde_json::{Value, json};
 
-/// Exports, and says what is left out.
+/// Exports, and prints what is left out.
 pub fn export(options: &cli::Export) -> Result<u8, Failure> {
     if let Some(out) = &options.out {
         may_replace(out, options.overwrite)?;

@@ -8,7 +8,7 @@ use backdrive_inspect::{Options, Source, inspect_with_data};
 use backdrive_pages::inspect::page;
 use serde_json::json;
 
-/// Inspects, and says what was found.
+/// Inspects, and prints what was found.
 pub fn inspect(options: &cli::Inspect) -> Result<u8, Failure> {
     if let Some(html) = &options.html {
         output::writable(html)?;

@@ -51,7 +51,7 @@ pub fn text(report: &Report) -> String {
 }
 
 fn signals(out: &mut String, report: &Report, several: bool) {
-    // Of several recordings of one device the first says what the signals are.
+    // Of several recordings of one device the first states what the signals are.
     let first = report.files.first().map_or("", String::as_str);
     let listed: Vec<_> = report.signals.iter().filter(|signal| !several || signal.file == first).collect();
     for signal in listed.iter().take(MOST_SIGNALS) {

@@ -48,8 +48,8 @@ impl Done {
         }
     }
 
-    /// 0 judged and stable, or there is no loop, which its text says; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
-    /// 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
+    /// 0 judged and stable, or there is no loop, which its text states; 1 not stable; 7 it cannot be judged. Before these, of a run that did not go as it
+    /// should: 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
             (0, None | Some(Outcome::Stable)) => 0,
@@ -244,7 +244,7 @@ mod tests {
     use backdrive_nodes::protocol::NodeStatus;
     use backdrive_nodes::stage::Clock;
 
-    /// A run at 5 kHz of 20 000 steps in which nodes missed so many deadlines.
+    /// A run at 5 kHz of 20 000 steps in which each node missed the given number of deadlines.
     fn report(missed: &[(&str, u64)]) -> RunReport {
         let node = |(name, missed): &(&str, u64)| NodeReport {
             with: Vec::new(),

@@ -55,7 +55,7 @@ pub fn run_graph(graph: &Graph, way: &Way) -> Result<Done, Failure> {
     }
 }
 
-/// What would stop a run is told before it begins.
+/// Reports what would stop a run before it begins.
 fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
     buildable(graph)?;
     // A run that ends with its last step, for a bag that cannot be written, would be lost whole.
@@ -90,7 +90,7 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     let report = backdrive_launch::run(graph, &place, options)?;
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
-    // What is known of the run is told even where its bag cannot be read.
+    // What is known of the run is reported even where its bag cannot be read.
     let read = |bag: &PathBuf| (summarise(bag), whole(bag));
     let read = bag.as_ref().map(|bag| progress::busy(&format!("reading {}", bag.display()), || read(bag)));
     let (summary, (complete, mut unreadable)) = read.map_or((None, (false, None)), |(summary, whole)| (Some(summary), whole));

@@ -1,4 +1,4 @@
-//! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the edge.
+//! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the stability limit.
 
 mod curve;
 mod loaded;
@@ -25,7 +25,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let loaded = progress::busy(&format!("reading {}", options.recording.display()), || Loaded::read(options))?;
     let question = loaded.question(options)?;
     if let Some(html) = &options.html {
-        // A report that cannot be written is told before the work, not after it.
+        // A report that cannot be written is reported before the work, not after it.
         output::writable(html)?;
     }
     let curve = match &options.sweep {

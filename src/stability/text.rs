@@ -115,7 +115,7 @@ fn margins(found: &Answer, lines: &mut Lines) {
         _ if to_clamp.is_some() => to_clamp.map(|db| format!("gain {db:.2} dB to where a clamp acts or the travel is left")),
         _ => None,
     };
-    // Margins of another edge than the one told would contradict it.
+    // Margins of another critical gain than the reported one would contradict it.
     let measured = found.margins.as_ref().filter(|_| found.margins_are_of_the_edge());
     if measured.is_none()
         && let Some(to_edge) = &to_edge

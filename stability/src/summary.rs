@@ -19,7 +19,7 @@ pub struct Summary {
     pub loop_gain: f64,
     /// The same at the end: a scheduled change or the guard may have moved it.
     pub last_loop_gain: f64,
-    /// What the loop did; `None` where there is no loop: `no_loop` says why.
+    /// What the loop did; `None` where there is no loop: `no_loop` states why.
     pub outcome: Option<Outcome>,
     /// Why there is no loop that could be judged, where there is none.
     pub no_loop: Option<&'static str>,
@@ -80,7 +80,7 @@ fn force_unit(graph: &Graph, kind: NodeKind) -> &'static str {
     if motion == Some(Motion::Rotation) { "N m" } else { "N" }
 }
 
-/// Reads a bag and says what happened.
+/// Reads a bag and summarises what happened.
 ///
 /// # Errors
 /// The bag cannot be read, or holds no graph.
@@ -130,7 +130,7 @@ impl Margins {
                     self.lowest = Some(*margin);
                 }
             }
-            // Free motion at the end says nothing of the contact before it.
+            // Free motion at the end is no evidence on the contact before it.
             known::FREE if self.unknown.is_some() => {}
             _ => self.unknown = Some(*margin),
         }

@@ -44,7 +44,7 @@ fn short((name, count): &(String, usize)) -> Remark {
     Remark { weight: Weight::Caution, records: vec![file_name(name).to_string()], signal: String::new(), about: "short", text }
 }
 
-/// Whether there is anything to fit: a sentence says what is wrong and what to do where there is not.
+/// Whether there is anything to fit. If there is not, a sentence states the cause and what to do.
 ///
 /// # Errors
 /// When nothing drives the device, nothing that was measured moves, or a unit, that of time among them, is off by so much that no fit can be meant.

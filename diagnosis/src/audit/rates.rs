@@ -11,8 +11,8 @@ use backdrive_plant::stepper::segments;
 /// Units that time is recorded in, s, and how its values read.
 const UNITS: [(f64, &str); 3] = [(1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds")];
 
-/// Whether the sample times of a set's recordings fit together: between samples an input runs as its hold says, so that a slow recording does not
-/// say what drives the device where a fast one shows that it does.
+/// Whether the sample times of a set's recordings are compatible. Between samples an input runs as its hold states, so a slow recording may miss an
+/// excitation that a fast one shows.
 ///
 /// # Errors
 /// One sentence where two recordings differ by more than a factor of two, with what to do.
@@ -62,8 +62,8 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
     })
 }
 
-/// Smallest share of an output's variance that the scaled prediction of the nominal model does not explain when the samples are taken at this period; of
-/// differences over a lag where no spring holds the position.
+/// Smallest share of an output's variance that the scaled prediction of the nominal model does not explain when the samples are taken at this period. Where
+/// no spring holds the position, the variance is that of differences over a lag.
 fn unexplained_variance(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
     let mut record = record.clone();
     (record.period, record.logged) = (period, None);

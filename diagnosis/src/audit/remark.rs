@@ -1,4 +1,4 @@
-//! What a check says, and of which recordings and signal.
+//! The content of a check's remark, and the recordings and the signal it refers to.
 
 use crate::problem::Record;
 use schemars::JsonSchema;

@@ -24,8 +24,8 @@ pub(super) fn clipped_share(samples: &[f64]) -> (f64, f64, f64) {
     if moving > tuning().recordings.moving { (share(low) + share(high), low, high) } else { (0.0, low, high) }
 }
 
-/// Ends of its range at which a signal stands for longer than a smooth one does: the level, and the share of samples there. In the band beside an end of the
-/// same width a smooth signal has two fifths as many samples, a limited one next to none; so has one of coarse steps.
+/// Ends of its range at which a signal stands for longer than a smooth one does: the level, and the share of samples there. The measure is the band next to
+/// an end, of the same width. A smooth signal has two fifths as many samples there, a limited one next to none; so has one of coarse steps.
 pub fn limits_reached(samples: &[f64]) -> Vec<(f64, f64)> {
     if clipped_share(samples).0 <= tuning().recordings.clipped {
         return Vec::new();
@@ -77,8 +77,8 @@ pub(super) fn quiet_top(samples: &[f64]) -> Option<f64> {
     (middle > 0.0).then(|| top / middle)
 }
 
-/// Largest correlation of the finest grain of `u` with that of `y` at the same sample or up to two samples before; 0 where `y` follows
-/// `u` instead, as a device does.
+/// Largest correlation of the finest grain of `u` with that of `y` at the same sample or up to two samples before. 0 where `y` follows `u` instead, as a
+/// device does.
 pub(super) fn answers(u: &[f64], y: &[f64]) -> f64 {
     let grain = |x: &[f64]| -> Vec<f64> { x.windows(5).map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).collect() };
     let (a, b) = (grain(u), grain(y));

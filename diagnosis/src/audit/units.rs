@@ -1,4 +1,4 @@
-//! Units and signs: what was measured beside what the nominal model, as given, says of the same.
+//! Units and signs: the measured signals compared with the predictions of the nominal model, as given.
 
 use super::remark::{Remark, Weight, file_name};
 use crate::problem::Problem;

@@ -6,17 +6,17 @@ use crate::problem::{Problem, Record};
 use backdrive_plant::model::OutputKind;
 use backdrive_plant::write::round_significant;
 
-/// From so many times its noise on a position moves far enough to be differentiated.
+/// Least motion of a position that can be differentiated, in standard deviations of its sensor noise.
 const MOVES: f64 = 30.0;
 
-/// A velocity that is not what its position says.
+/// A velocity that contradicts its position.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contradiction {
     /// The velocity, by its place among the outputs.
     pub output: usize,
     /// What was seen and what to do, as a clause.
     pub text: String,
-    /// Whether neither a factor nor a lag alone puts it right, so that nothing says which of the two columns can be believed.
+    /// Whether neither a factor nor a lag alone corrects it, so that it is unknown which of the two columns is right.
     pub is_both: bool,
     /// The file where it was seen first.
     pub file: String,

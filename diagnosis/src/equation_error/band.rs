@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// From this share of the sample rate on a motion is taken for noise of its sensor.
 const HIGHEST: f64 = 0.35;
 
-/// Whether force and motion of a problem are both known: one body, moved as it was recorded, and the force that this took.
+/// Whether force and motion of a problem are both known: one body, moved along the recorded motion, and the force that this took.
 pub(crate) fn is_known(problem: &Problem) -> bool {
     let model = &problem.model;
     let is_moved = matches!(model.inputs.as_slice(), [input] if input.kind == InputKind::Motion);
@@ -24,7 +24,7 @@ pub(crate) fn is_known(problem: &Problem) -> bool {
         && problem.fit.iter().chain(&problem.held_out).all(|record| measures_force(record) && record.conditions.is_empty())
 }
 
-/// Whether the force of an element of this kind depends on the path: its numbers are no factors of columns, not even nearly.
+/// Whether the force of an element of this kind depends on the path. Its parameters are then not factors of columns, not even approximately.
 pub(super) fn has_memory(kind: &str) -> bool {
     crate::physics::physics_named(kind).is_some_and(|physics| physics.facts.memory)
 }

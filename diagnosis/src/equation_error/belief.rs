@@ -1,6 +1,6 @@
 //! How sure a law is that was chosen on forces: the probability that it, and its kind, are right.
 //!
-//! A logistic regression over a few figures, whose coefficients were found on laws hidden in the noise of real machines; docs/diagnosis.md says how.
+//! A logistic regression over a few figures. Its coefficients were found on laws hidden in the noise of real machines; docs/diagnosis.md describes how.
 
 use super::explore::{Explored, Looked, better};
 use super::room::Room;

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Looked {
     /// Which of [`Room::laws`].
     pub laws: Vec<usize>,
-    /// The choices of their nonlinear numbers in each band.
+    /// The choices of their nonlinear parameters in each band.
     pub chosen: Vec<Vec<Chosen>>,
     /// What is left of each stretch that was left out, over what the nominal model leaves on average: the geometric mean over the bands.
     pub errors: Vec<f64>,
@@ -27,7 +27,7 @@ impl Looked {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
     }
 
-    /// What they cost: their numbers, and for each law that it was picked among a dozen.
+    /// Their cost: their number of parameters, and for each law that it was picked among a dozen.
     pub fn cost(&self) -> f64 {
         self.numbers as f64 + tuning().equation_error.picked * self.laws.len() as f64
     }
@@ -86,7 +86,7 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
             before.truncate(tuning().equation_error.extended);
         }
     }
-    // Where a drive rests and logs zeros there is no error at all: what is far below what the best leaves says nothing, of whichever structure.
+    // Where a drive rests and logs zeros there is no error at all. A residual far below that of the best structure carries no information on any structure.
     let best = all.values().min_by(|a, b| a.mean().total_cmp(&b.mean()))?.clone();
     let floor = |((room, scale), left): ((&Room, &f64), &Left)| tuning().equation_error.floor * mean(&room.mean_square(left)) / scale;
     let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.left).map(floor).collect();
@@ -100,10 +100,10 @@ fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
-/// What is as small as rounding says nothing.
+/// Values of this size are within rounding errors and carry no information.
 const SMALLEST: f64 = 1e-12;
 
-/// The same with its errors and numbers, from what it leaves.
+/// The same with its errors and number of parameters, from its residual.
 fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], mut l: Looked) -> Looked {
     let mut errors: Vec<f64> = Vec::new();
     for (((room, scale), floor), left) in rooms.iter().zip(scales).zip(floors).zip(&l.left) {
@@ -116,7 +116,7 @@ fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], mut l: Looked) -> Look
     l
 }
 
-/// The choices of the nonlinear numbers of laws in a band, from those of some of them on.
+/// The choices of the nonlinear parameters of laws in a band, from those of some of them on.
 fn chosen(room: &Room, before: &[Chosen], laws: &[usize]) -> Option<Vec<Chosen>> {
     let mut chosen: Vec<Chosen> = before.to_vec();
     for law in laws {
@@ -168,8 +168,8 @@ pub(crate) fn better(first: &Looked, second: &Looked) -> Better {
 
 /// How surely what a richer structure has more of the force is in what a simpler one leaves of left-out stretches, in standard errors.
 ///
-/// After Clark and West (2007): the mean product of the two, each stretch in its own error. A comparison of errors alone is lost by
-/// a richer structure whose numbers are hardly known, also where it is the right one.
+/// After Clark and West (2007): the mean product of the two, each stretch in its own error. A comparison of errors alone is lost by a richer structure
+/// whose parameters are hardly known, also where it is the right one.
 fn shows(rooms: &[Room], simple: &Looked, rich: &Looked) -> f64 {
     let mut products: Vec<f64> = Vec::new();
     for ((room, simple), rich) in rooms.iter().zip(&simple.left).zip(&rich.left) {

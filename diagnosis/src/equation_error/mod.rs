@@ -1,7 +1,7 @@
 //! Laws looked at on forces along a measured motion.
 //!
-//! Where the motion of a body and the force that it takes are both known, the force of a law along that motion is known without a simulation of the rest. So every law,
-//! and every pair, is held against the force in a band in which the motion is resolved, and judged by what it predicts of stretches that were left out.
+//! Where the motion of a body and the force on it are both known, the force of a law along that motion is known without a simulation of the rest. So every
+//! law, and every pair, is compared with the force in a band in which the motion is resolved. It is judged by its prediction of held-out stretches.
 
 mod band;
 mod belief;
@@ -20,7 +20,8 @@ pub(crate) use search::search_on_forces;
 
 use crate::problem::Problem;
 
-/// What was looked at on forces, for those who calibrate its confidence: the physics of each law that is claimed, with its figures for the law and for its kind.
+/// What was examined on forces, for those who calibrate its confidence: the effect of each law that is claimed, with its figures for the law and for its
+/// kind.
 pub fn figures_of(problem: &Problem) -> Vec<(String, [Figures; 2])> {
     let rooms: Vec<room::Room> = match is_known(problem) {
         true => corners(problem).into_iter().filter_map(|corner| room::Room::of(problem, corner, &[])).collect(),

@@ -3,7 +3,7 @@
 use super::belief::Belief;
 use crate::tuning::tuning;
 
-/// What a search on forces says of its structures.
+/// Results of a search on forces for its structures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OnForces {
     /// The corner of the band of its fits, Hz.
@@ -16,7 +16,7 @@ pub struct OnForces {
     pub beliefs: Vec<(String, Belief)>,
     /// Effects that belong to another one, such as the zero of a spring, by id.
     pub companions: Vec<String>,
-    /// What the claimed structure leaves, its numbers refined by simulation, in noise standard deviations of the force's sensor in that band: rms.
+    /// Residual of the claimed structure with its parameters refined by simulation, in noise standard deviations of the force's sensor in that band: rms.
     pub left: f64,
     /// Whether so much is left, of the force and beside the sensor's noise, that a law that is only simulated may be what is missing.
     pub is_beyond: bool,

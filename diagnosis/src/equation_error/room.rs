@@ -1,4 +1,4 @@
-//! Every law that can be looked at on forces along a motion, as columns beside those of the nominal model's own numbers.
+//! Every law that can be examined on forces along a motion, as columns (regressors) beside those of the nominal model's own parameters.
 
 use super::gram::{Gram, Left, Sum};
 use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// A law, or a few that go together, with each choice of nonlinear numbers.
+/// A law, or a few that act in combination, with each choice of nonlinear parameters.
 pub(crate) struct Law {
     /// Which of the hypotheses.
     pub hypotheses: Vec<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct Law {
     variants: Vec<Variant>,
     /// The column of what it takes the place of.
     shift: Option<usize>,
-    /// Columns of the nominal model's numbers that it takes the place of.
+    /// Columns of the nominal model's parameters that it replaces.
     drops: Vec<usize>,
     /// Numbers that it adds.
     pub numbers: usize,
@@ -32,7 +32,7 @@ struct Variant {
     columns: Vec<usize>,
 }
 
-/// A law with a choice of its nonlinear numbers: which of [`Room::laws`], which of its variants.
+/// A law with a choice of its nonlinear parameters: which of [`Room::laws`], which of its variants.
 pub(crate) type Chosen = (usize, usize);
 
 /// Hypotheses, which of [`Room::hypotheses`], with their parameters.
@@ -52,7 +52,7 @@ pub(crate) struct Room {
     base: Vec<Stated>,
 }
 
-/// A free number of the nominal model.
+/// A free parameter of the nominal model.
 struct Stated {
     path: String,
     given: f64,
@@ -222,7 +222,7 @@ impl Room {
         Some(Room { problem, corner, hypotheses, laws, gram, base })
     }
 
-    /// The physics of a law by which it is named.
+    /// The effect by which a law is named.
     pub fn named(&self, law: usize) -> &Hypothesis {
         &self.hypotheses[self.laws[law].hypotheses[0]]
     }
@@ -247,7 +247,7 @@ impl Room {
         self.within_reason(Sum { target, by: base.filter(|column| !dropped(column)).chain(own).collect() })
     }
 
-    /// The same without numbers of the nominal model that would come out below 0 and cannot: a falling friction is not a negative viscous one.
+    /// The same without parameters of the nominal model that would come out below 0 and cannot: a falling friction is not a negative viscous one.
     fn within_reason(&self, mut sum: Sum) -> Sum {
         loop {
             let Some((factors, _)) = self.gram.fit(&sum) else { return sum };
@@ -314,7 +314,7 @@ impl Room {
         self.left(laws).map(|left| self.mean_square(&left))
     }
 
-    /// The choice of a law's nonlinear numbers that leaves least beside others.
+    /// The choice of a law's nonlinear parameters with the least residual beside others.
     pub fn best_beside(&self, others: &[Chosen], law: usize) -> Option<Chosen> {
         let one = |variant: usize| {
             let laws: Vec<Chosen> = others.iter().copied().chain([(law, variant)]).collect();

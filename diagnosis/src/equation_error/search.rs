@@ -182,7 +182,7 @@ fn shortlist<'e>(rooms: &[Room], explored: &'e Explored) -> Vec<&'e Looked> {
     all
 }
 
-/// Laws simulated along the motion, with all numbers refined.
+/// Laws simulated along the motion, with all parameters refined.
 fn fitted(evaluator: &Evaluator, room: &Room, chosen: &[super::room::Chosen]) -> Option<Candidate> {
     let problem = evaluator.problem;
     let (_, all) = room.fit(chosen)?;

@@ -11,12 +11,12 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use backdrive_signal::statistics::rms;
 
-/// The excitation that determines parameters of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::free`], `told` the standard deviation that is told of each number, in the fit's own unit. It is wider than
-/// that of the sensors' noise alone where residuals are correlated or models differ; an experiment is taken to lessen it as much as that. What exceeds the budget is not tried.
+/// The excitation that determines parameters of a structure which the recordings do not determine. `numbers` are places among [`Structure::free`], `told`
+/// the reported standard deviation of each parameter, in the fit's own unit. It is wider than that of the sensors' noise alone where residuals are
+/// correlated or models differ; an experiment is assumed to reduce it by the same factor. What exceeds the budget is not tried.
 ///
 /// # Errors
-/// Says why when no excitation would determine them.
+/// States why when no excitation would determine them.
 pub fn excite<'a>(
     problem: &'a Problem,
     structure: &Structure,
@@ -37,7 +37,7 @@ pub fn excite<'a>(
     let own: Vec<f64> = structure.free.iter().zip(values).map(|(n, v)| n.to_internal(*v)).collect();
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
-    // What is told over what the sensors' noise alone makes of it.
+    // The reported standard deviation, divided by the one caused by the sensors' noise alone.
     let ratio = |(own, told): (&f64, &f64)| Some(told / own).filter(|ratio| ratio.is_finite() && *ratio > 0.0).unwrap_or(1.0);
     let wider: Vec<f64> = known.deviations(None).iter().zip(told).map(ratio).collect();
     let before = told;
@@ -91,7 +91,7 @@ pub fn excite<'a>(
     Ok(planner.experiment(case, sentence, names, *separation, &change, rms(&change)))
 }
 
-/// What a number is called.
+/// The name of a parameter.
 fn name_of(problem: &Problem, structure: &Structure, number: usize) -> String {
     match structure.free.get(number).map(|n| &n.role) {
         Some(Role::Stated(i)) => problem.stated.get(*i).map_or_else(String::new, |s| s.path.clone()),

@@ -1,8 +1,8 @@
 //! The excitations that may be chosen, within the range that the recordings cover.
 //!
-//! Each shape is there for what it tells apart:
+//! Each shape separates certain laws:
 //!
-//! | shape | tells apart |
+//! | shape | separates |
 //! |---|---|
 //! | triangles of two speeds | friction that grows with speed from friction that does not |
 //! | slow small triangles | a jump of friction at reversal from presliding, a gap from either |
@@ -11,7 +11,7 @@
 //! | multisine at two levels, sweeps | delay, lag, inertia and compliance by phase and gain; what scales from what does not |
 //! | steps of several levels | a limit of the drive from a softening spring; what saturates |
 //! | impacts | contacts and what is stiff |
-//! | a bias with little on it | lopsided laws from offsets; a bias closes a gap |
+//! | a bias with little on it | asymmetric laws from offsets; a bias closes a gap |
 
 use crate::problem::Problem;
 use crate::tuning::tuning;
@@ -225,7 +225,7 @@ fn motions(range: &InputRange, band: &Band) -> Vec<(Shape, f64)> {
     ]
 }
 
-/// Rest before it, and what would jump or ends up elsewhere faded.
+/// Rest before it. Excitations that would start with a jump, or would not end at zero, are faded.
 fn framed(shape: Shape, offset: f64, length: f64) -> Excitation {
     let fade = round_significant(0.08 * length, 2);
     let fades = offset != 0.0 || matches!(shape, Shape::Sweep { .. } | Shape::Multisine { .. } | Shape::Sines { .. });

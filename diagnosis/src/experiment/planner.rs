@@ -30,7 +30,7 @@ pub(super) struct Pair {
     pub b: usize,
     /// Whether only the first has to fail to imitate the second, which contains it.
     pub directed: bool,
-    /// Separation from which an experiment tells them apart, standard deviations in one playing.
+    /// Least separation at which an experiment decides between them, standard deviations in one run of the excitation.
     pub least: f64,
 }
 

@@ -65,7 +65,7 @@ impl<'a> Rival<'a> {
         setup.prediction(&self.as_fitted(setup.problem)?, trial)
     }
 
-    /// Derivatives of what it predicts, by each number in its own unit; all 0 for what belongs to a recording.
+    /// Derivatives of its prediction, by each parameter in its own unit; all 0 for what belongs to a recording.
     pub(super) fn jacobian(&self, setup: &Setup, trial: &Trial, own: &[f64], at: &[f64]) -> Vec<Vec<f64>> {
         let column = |(j, number): (usize, &FreeParameter)| {
             let none = || vec![0.0; at.len()];
@@ -88,8 +88,8 @@ impl<'a> Rival<'a> {
         self.structure.free.par_iter().enumerate().map(column).collect()
     }
 
-    /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances: with the Jacobian J
-    /// of the experiment and the information M of the recordings, the minimum over s of |d - J s|² + s' M s.
+    /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances. With the Jacobian J
+    /// of the experiment and the information M of the recordings it is the minimum over s of |d - J s|² + s' M s.
     pub(super) fn unexplained(&self, jacobian: &[Vec<f64>], difference: &[f64]) -> f64 {
         let whole = dot(difference, difference);
         let (mut matrix, right) = normal_equations(jacobian, difference, None);
@@ -102,8 +102,8 @@ impl<'a> Rival<'a> {
         scaled.cholesky().map_or(0.0, |c| (whole - short.dot(&c.solve(&short))).clamp(0.0, whole))
     }
 
-    /// The same of the difference from what another predicts, `target`, after as many Gauss-Newton steps as lower it: where a law has a threshold or an end, the first says
-    /// little. `pick` takes the outputs that count.
+    /// The same for the difference from another structure's prediction, `target`, after all Gauss-Newton steps that lower the cost. Where a law has a
+    /// threshold or an end, the first step alone is not informative. `pick` takes the outputs that count.
     pub(super) fn unexplained_after_steps(
         &self,
         setup: &Setup,
@@ -149,8 +149,8 @@ impl<'a> Rival<'a> {
         Some(least)
     }
 
-    /// The same by a true refit to the recordings and to what `other` predicts for the experiment: what the cost then is above its own
-    /// on the recordings alone, in noise variances.
+    /// The same by a true refit to the recordings and to the prediction of `other` for the experiment. The result is the increase of the cost over that on
+    /// the recordings alone, in noise variances.
     pub(super) fn refit(&self, setup: &Setup, trial: &Trial, other: &Rival) -> Option<f64> {
         let columns = setup.outputs_of(&other.as_fitted(setup.problem)?, trial)?;
         let mut record = trial.record.clone();

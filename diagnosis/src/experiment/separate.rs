@@ -12,21 +12,22 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
 
-/// The excitation that tells fitted structures apart, the likeliest first. `noise_sd` is the noise standard deviation of each output, in its
-/// unit. What exceeds the budget is not tried.
+/// The excitation that separates fitted structures, the likeliest first. `noise_sd` is the noise standard deviation of each output, in its unit. What
+/// exceeds the budget is not tried.
 ///
 /// # Errors
-/// Says why when no excitation would, nor any further sensor: fewer than two structures, none that can be simulated, or a difference too small.
+/// States why when no excitation would, nor any further sensor: fewer than two structures, none that can be simulated, or a difference too small.
 pub fn separate<'a>(problem: &'a Problem, candidates: &[&Candidate], noise_sd: &[f64], budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let fitted: Vec<(&Structure, &Fit)> = candidates.iter().map(|c| (&c.structure, &c.fit)).collect();
     separate_fitted(problem, &fitted, noise_sd, budget)
 }
 
-/// The excitation that tells a law from one of more numbers that fits as well, so clearly that one playing does: else every law would be held open for every finer one.
-/// `contains`: whether the first is a special or limiting case of the second, which can then imitate it.
+/// The excitation that separates a law from one of more parameters that fits as well, clearly enough in one run of the excitation. Without that condition
+/// every law would remain open because of every finer one. `contains`: whether the first is a special or limiting case of the second, which can then
+/// imitate it.
 ///
 /// # Errors
-/// Says why when none would.
+/// States why when none would.
 pub fn confirm<'a>(
     problem: &'a Problem,
     [simple, rich]: [&Candidate; 2],
@@ -100,7 +101,7 @@ fn separate_pairs<'a>(
     Ok(planner.separating(rivals, &cases[case], pair, separation, inseparable))
 }
 
-/// The physics that a structure adds, sorted, so that their order does not matter.
+/// The effects that a structure adds, sorted, so that their order does not matter.
 fn ids(structure: &Structure) -> Vec<&str> {
     let mut all: Vec<&str> = structure.added.iter().map(|h| h.id.as_str()).collect();
     all.sort_unstable();

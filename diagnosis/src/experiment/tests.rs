@@ -1,4 +1,4 @@
-//! Experiments chosen for devices of known physics, and what they then show.
+//! Experiments chosen for devices of known effects, and what they then show.
 
 use super::separate::separate_fitted;
 use super::*;
@@ -224,7 +224,7 @@ fn as_candidate(problem: &Problem, (structure, fit): (Structure, Fit)) -> Candid
 
 #[test]
 fn a_law_that_contains_another_is_told_from_it_by_what_the_other_cannot_imitate() {
-    // Pushed one way only: lopsided friction is dry friction there, and its other side is as it was started.
+    // Pushed one way only: asymmetric friction is dry friction there, and the parameter of its other side keeps its start value.
     let push: Vec<f64> = (0..3000).map(|k| if k < 40 { 3.0 } else { 0.6 + 0.1 * (0.02 * f64::from(k)).sin() }).collect();
     let free = MASS.replace("kind = \"spring\"", "kind = \"damper\"").replace("stiffness = 200.0", "damping = 0.8");
     let rubbing = format!("{free}{RUB}");
@@ -239,7 +239,7 @@ fn a_law_that_contains_another_is_told_from_it_by_what_the_other_cannot_imitate(
         plan.separation >= tuning().experiment.wanted && plan.repeats == 1 && plan.sentence.contains("the simpler one refitted"),
         "{plan:?}"
     );
-    // As equals they are not told apart: the richer one imitates the other in any experiment.
+    // As equals they are not separated: the richer one imitates the other in any experiment.
     let equals = confirm(&problem, [&simple, &rich], false, &problem.noise_sd, &soon());
     assert!(equals.is_err(), "{equals:#?}");
     // And where the richer one is the simpler one, there is nothing to tell.
@@ -261,7 +261,7 @@ fn what_slow_motion_hides_is_excited() {
     let found = excited(&[mass], &told).unwrap();
     println!("{found:#?}");
     assert!(found.separation > 8.0 && found.sentence.contains("bodies.mass"), "{found:?}");
-    // What is told decides whether a number is open, and how well an experiment would determine it.
+    // The reported deviation decides whether a parameter is open, and how well an experiment would determine it.
     let known = excited(&[mass], &vec![0.04; told.len()]).map(|plan| plan.sentence).unwrap_err();
     assert!(known.to_string().contains("a standard deviation of 5 % or less"), "{known}");
     let wider = excited(&[mass], &told.iter().map(|sd| 3.0 * sd).collect::<Vec<f64>>()).unwrap();

@@ -13,11 +13,12 @@ pub struct Experiment {
     pub text: String,
     /// The excitation on one line, as command lines and graphs have it.
     pub excitation: String,
-    /// What it tells apart, or the parameters that it determines.
+    /// The structures that it separates, or the parameters that it determines.
     pub between: Vec<String>,
     /// Standard deviations between the two of them that it separates least, each refitted to it.
     pub separation: f64,
-    /// Root mean square of that difference over all samples, noise standard deviations. For [`super::excite`] that of one standard deviation of the number.
+    /// Root mean square of that difference over all samples, noise standard deviations. For [`super::excite`] that of one standard deviation of the
+    /// parameter.
     pub level: f64,
     /// The output in which most of it shows.
     pub output: String,
@@ -44,7 +45,7 @@ pub struct NewSensor {
     pub noise_sd: f64,
 }
 
-/// Why there is no experiment, in one sentence that says what would help.
+/// Why there is no experiment, in one sentence that names a way to improve.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Reason(pub String);

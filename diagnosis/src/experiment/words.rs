@@ -121,7 +121,7 @@ fn only<'a>(s: &'a Structure, other: &Structure) -> Vec<&'a Hypothesis> {
     s.added.iter().filter(|h| other.added.iter().all(|o| o.id != h.id)).collect()
 }
 
-/// What it is that tells two structures apart, where each has one physics that the other has not.
+/// The property that separates two structures, where each has one effect that the other does not have.
 pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
     let (a, b) = (only(a, b), only(b, a));
     let ([a], [b]) = (a.as_slice(), b.as_slice()) else { return None };
@@ -159,7 +159,7 @@ pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
     Some(said)
 }
 
-/// What would have to be known of two structures that no recording of the same signals tells apart.
+/// The information needed to decide between two structures that no recording of the same signals can separate.
 pub(super) fn same_force(a: &Structure, b: &Structure) -> &'static str {
     let own = [only(a, b), only(b, a)].concat();
     own.iter().find_map(|h| h.physics.facts.twin).unwrap_or("they are the same force under two names")

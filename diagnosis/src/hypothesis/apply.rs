@@ -6,7 +6,7 @@ use backdrive_plant::model::{Body, Element, Model, OutputKind, Place};
 use backdrive_plant::write::{Edit, ElementSpec, Value};
 
 impl Hypothesis {
-    /// The model with this physics added.
+    /// The model with this effect added.
     ///
     /// # Errors
     /// When the values are not one for each parameter or not possible, or the model is not the one that the hypothesis was made for.
@@ -36,7 +36,7 @@ impl Hypothesis {
         self.parameters.iter().map(|p| Some(edited.values_at(&p.path).ok()?.get(p.index.unwrap_or(0))? - own)).collect()
     }
 
-    /// Whether both may be applied to one model: they neither take the place of the same element nor set the same number.
+    /// Whether both may be applied to one model: they neither replace the same element nor set the same parameter.
     pub fn compatible(&self, other: &Hypothesis) -> bool {
         let same_element = self.replaces.iter().any(|name| other.replaces.contains(name));
         let same_number = self.parameters.iter().any(|p| other.parameters.iter().any(|q| p.path == q.path));

@@ -50,7 +50,7 @@ impl<'a> ElementBuilder<'a> {
         ElementBuilder::of_kind(sites, physics, physics.name, site)
     }
 
-    /// The same where the element's kind has another name than the physics.
+    /// The same where the element's kind has another name than the effect.
     pub fn of_kind(sites: &'a Sites<'a>, physics: &'static Physics, kind: &str, site: &Site) -> Option<ElementBuilder<'a>> {
         let kind = kind_named(kind)?;
         let name = free_name(sites.model, &format!("{}_{}", physics.name, site.label()));
@@ -121,13 +121,13 @@ impl<'a> ElementBuilder<'a> {
         self
     }
 
-    /// A word that sets its id apart from others of this physics at this place.
+    /// A word that distinguishes its id from others of this effect at this place.
     pub fn tag(mut self, tag: &'static str) -> Self {
         self.tag = tag;
         self
     }
 
-    /// A number that is fitted.
+    /// A parameter that is fitted.
     pub fn number(mut self, key: &'static str, freedom: Freedom) -> Self {
         self.push(key, None, freedom);
         self
@@ -139,7 +139,7 @@ impl<'a> ElementBuilder<'a> {
         self
     }
 
-    /// A number that stays.
+    /// A parameter that stays fixed.
     pub fn fixed(mut self, key: &'static str, value: f64) -> Self {
         if let Some(slot) = self.slot(key) {
             self.slots[slot] = vec![Source::Fixed(value)];
@@ -279,7 +279,7 @@ pub(crate) fn series(
     finish(id, physics, place, Vec::new(), parameters, starts, Form::Series { joint, body, spring, damper })
 }
 
-/// A free body hung on another by an element of the physics' kind: `freedoms` are those of the keys, and of the body's inertia.
+/// A free body hung on another by an element of the effect's kind: `freedoms` are those of the keys, and of the body's inertia.
 pub(crate) fn hung(
     sites: &Sites,
     physics: &'static Physics,
@@ -315,13 +315,13 @@ pub(crate) fn hung(
 }
 
 impl Hypothesis {
-    /// Says which number of the model does the same.
+    /// Sets the parameter of the model that has the same effect.
     pub(crate) fn same_as(mut self, path: Option<String>) -> Hypothesis {
         self.same_as = path;
         self
     }
 
-    /// Says that its parameters shift a signal in time.
+    /// Marks its parameters as shifts of a signal in time.
     pub(crate) fn in_samples(mut self) -> Hypothesis {
         self.parameters.iter_mut().for_each(|p| p.in_samples = true);
         self
@@ -339,14 +339,14 @@ pub(crate) fn only_input_and_output(model: &Model) -> bool {
     model.inputs.len() == 1 && model.outputs.len() == 1 && model.inputs[0].kind == InputKind::Force
 }
 
-/// The number of a linear element of this kind between a body and ground.
+/// The parameter of a linear element of this kind between a body and ground.
 pub(crate) fn stated(model: &Model, body: usize, kind: &str, key: &str) -> Option<String> {
     let to_ground = |between: [Option<usize>; 2]| between.contains(&Some(body)) && between.contains(&None);
     let found = model.elements.iter().find(|e| e.law.kind().name == kind && to_ground(e.between));
     found.map(|e| format!("elements.{}.{key}", e.name))
 }
 
-/// The only number of a law.
+/// The only parameter of a law.
 pub(crate) fn first_value(law: &Law) -> f64 {
     law.values().first().and_then(|v| v.first()).copied().unwrap_or(0.0)
 }

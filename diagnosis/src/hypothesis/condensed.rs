@@ -1,6 +1,6 @@
 //! Where a fit of a joint with a body in it starts. A model without that body has already made the joint as soft, and its ends as heavy, as both springs
-//! and the body together look from outside (static condensation: Guyan 1965). Beside what it absorbed, the body would count twice; so a start takes that
-//! back: the joint's own spring is stiffer, the ends are lighter, and slow motion is as before.
+//! and the body together look from outside (static condensation: Guyan 1965). With these absorbed values the body would count twice. So a start
+//! re-initialises them: the joint's own spring is stiffer, the ends are lighter, and slow motion is the same as before.
 
 use super::types::{Form, Hypothesis};
 use crate::physics::physics_named;
@@ -18,8 +18,9 @@ pub(crate) struct Condensed {
 }
 
 impl Hypothesis {
-    /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path; `absorbed` says whether
-    /// that is a fitted one, which gives back what it absorbed, or one that knows nothing of the body.
+    /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path.
+    /// `absorbed` states whether that value is a fitted one, which is restored to what it was before it absorbed the body, or one that knows nothing of the
+    /// body.
     pub(crate) fn condensed(&self, model: &Model, stated: &dyn Fn(&str) -> Option<f64>, absorbed: bool) -> Vec<Condensed> {
         let Form::Series { joint, .. } = &self.form else { return Vec::new() };
         let ends = joint.each_ref().map(|name| model.bodies.iter().position(|b| b.name == *name));
@@ -34,7 +35,7 @@ impl Hypothesis {
         };
         let ends = ends.map(inertia);
         let lightest = ends.iter().flatten().map(|(_, own)| *own).fold(f64::INFINITY, f64::min);
-        // Where no spring holds the joint, nothing was absorbed that would have to be given back.
+        // Where no spring holds the joint, nothing was absorbed that would have to be re-initialised.
         if !lightest.is_finite() || stiffness <= 0.0 {
             return Vec::new();
         }

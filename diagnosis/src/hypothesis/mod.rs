@@ -1,6 +1,6 @@
-//! A physics that a model may have left out, at a place where it could sit, as a change to the model.
+//! An effect that a model may lack, at a place where it could act, as a change to the model.
 //!
-//! What is known of each physics stands in its own file in [`crate::physics`]; here is what they are made of.
+//! What is known of each effect stands in its own file in [`crate::physics`]; here is what they are made of.
 
 mod apply;
 pub(crate) mod builder;

@@ -168,8 +168,8 @@ impl Scales {
         self.outputs.get(index).copied().unwrap_or_default()
     }
 
-    /// Force that a place knows, N or N m: the largest rms of what its elements, its inputs and its bodies' inertia take, and no less than a share of the largest
-    /// anywhere: a refit without what is missing there may have cut the place off.
+    /// Reference force of a place, N or N m: the largest rms of the force of its elements, its inputs and its bodies' inertia. It is at least a share of
+    /// the largest force anywhere, because a refit without the missing effect may have decoupled the place.
     pub fn force(&self, model: &Model, between: [Option<usize>; 2]) -> f64 {
         let same = |ends: &[Option<usize>; 2]| *ends == between || *ends == [between[1], between[0]];
         let elements = model.elements.iter().enumerate().filter(|(_, e)| same(&e.between)).map(|(i, _)| self.element(i).rms);

@@ -1,4 +1,4 @@
-//! The places of a device where physics may have been left out.
+//! The places of a device where an effect may be missing.
 
 use super::scales::Scales;
 use backdrive_plant::elements::{Law, Role};
@@ -126,7 +126,7 @@ impl<'a> Sites<'a> {
     pub fn dry_friction(&self, site: &Site) -> Option<DryFriction> {
         self.elements_at(site).find_map(|(index, element)| {
             let (level, kind) = (self.kin[index].level?, element.law.kind().name);
-            // One number is its level.
+            // One parameter is its level.
             let plain = element.law.kind().parameters.len() == 1;
             Some(DryFriction { index, kind, level, plain })
         })

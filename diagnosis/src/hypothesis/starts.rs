@@ -2,8 +2,8 @@
 
 use super::types::{Family, Hypothesis, Parameter};
 
-/// Values with which one hypothesis does nearly what another at the same place with fewer parameters does with its own, where it is the same law resolved
-/// more finely: friction that builds up over a distance is that of many contacts, described by one state. `None` where they are no such two.
+/// Values with which one hypothesis nearly reproduces another one of fewer parameters at the same place, where both are the same law at different
+/// resolution. Example: friction that builds up over a distance is that of many contacts, described by one state. `None` for any other pair.
 pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     if !coarse.place.same(&finer.place) || !coarse.replaces.iter().all(|name| finer.replaces.contains(name)) {
         return None;
@@ -11,8 +11,8 @@ pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -
     (finer.physics.facts.refine)(coarse, values, finer)
 }
 
-/// Where a fit of `other` starts in the place of a law that was fitted: of friction that holds and slides the forces are those of the one before, all
-/// scaled alike. Elsewhere its own starts.
+/// Where a fit of `other` starts as an alternative to a law that was fitted. For friction that holds and slides, the start has the forces of the fitted
+/// law, all scaled alike. For other laws, the law's own starts.
 pub(crate) fn starts_beside(law: &Hypothesis, values: &[f64], other: &Hypothesis) -> Vec<Vec<f64>> {
     let is_force = |p: &Parameter| matches!(p.unit.as_str(), "N" | "N m");
     let forces = |h: &Hypothesis, values: &[f64]| {

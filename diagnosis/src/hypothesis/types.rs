@@ -1,4 +1,4 @@
-//! A physics, what is known of it before any device is looked at, and a physics at a place.
+//! An effect, its properties that are independent of any device, and an effect at a place.
 
 use super::sites::Sites;
 use backdrive_plant::elements::Kind;
@@ -38,7 +38,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// What all of a family have in common, in words; `None` where that says nothing.
+    /// Common description of a family in words; `None` where there is no informative one.
     pub fn words(self) -> Option<&'static str> {
         match self {
             Family::Friction => Some("dry friction"),
@@ -53,7 +53,7 @@ impl Family {
     }
 }
 
-/// The variable that a physics' force is plotted against.
+/// The variable that an effect's force is plotted against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
@@ -71,7 +71,7 @@ pub enum Against {
     Time,
 }
 
-/// In which state of the device a physics shows.
+/// The state of the device in which an effect shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// Where the velocity changes its sign.
@@ -86,8 +86,8 @@ pub enum State {
     WithItsVariable,
 }
 
-/// What a physics is among those that are easily taken for each other: two with different marks are told apart by what
-/// [`crate::experiment`] says of the pair.
+/// The mark of an effect among those that are easily confused. Two effects with different marks are separated by the property that [`crate::experiment`]
+/// names for the pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Mark {
@@ -111,7 +111,7 @@ pub enum Mark {
     Other,
 }
 
-/// A physics: everything that diagnosis knows of it before any device is looked at.
+/// An effect: everything that diagnosis knows of it before any device is looked at.
 pub struct Physics {
     /// Name in verdicts: an element kind, the key of a signal, `inertia`, `gravity` or `series_compliance`.
     pub name: &'static str,
@@ -119,7 +119,7 @@ pub struct Physics {
     pub family: Family,
     /// Its name in words, with an article where it takes one.
     pub words: &'static str,
-    /// The parameter that says how large it is.
+    /// The parameter that gives its size.
     pub size: &'static str,
     /// What its force is plotted against.
     pub against: Against,
@@ -133,11 +133,11 @@ pub struct Physics {
     pub(crate) propose: fn(&Sites) -> Vec<Hypothesis>,
 }
 
-/// What is so of a few physics only: a file says what differs from [`Facts::NONE`].
+/// Properties of a few effects only: a file states what differs from [`Facts::NONE`].
 pub struct Facts {
-    /// Whether its force grows in proportion to its first parameter, so that the smallest size that would show can be told.
+    /// Whether its force is proportional to its first parameter, so that the smallest detectable size can be computed.
     pub proportional: bool,
-    /// What would have to be known to tell it from a physics whose force is the same in the same place; `None` where there is none.
+    /// The information needed to separate it from an effect whose force is the same in the same place; `None` where there is none.
     pub twin: Option<&'static str>,
     /// Of dry friction: the parameters whose mean is the level at speed (the values of a list add up).
     pub sliding: &'static [&'static str],
@@ -147,8 +147,8 @@ pub struct Facts {
     pub memory: bool,
     /// Whether it holds a joint, as a spring does.
     pub holds: bool,
-    /// Values with which a hypothesis of this physics does nearly what a coarser one at the same place does with its own, where it is the same
-    /// law resolved more finely: friction that builds up over a distance is that of many contacts, described by one state.
+    /// Values with which a hypothesis of this effect nearly reproduces a coarser one at the same place, where it is the same law at finer resolution.
+    /// Example: friction that builds up over a distance is that of many contacts, described by one state.
     pub refine: fn(&Hypothesis, &[f64], &Hypothesis) -> Option<Vec<f64>>,
     /// Ranges of parameters that a device may have, by key, in SI units: what a fit finds outside them is never claimed. Narrower than what it may try.
     pub plausible: &'static [(&'static str, f64, f64)],
@@ -156,9 +156,9 @@ pub struct Facts {
     pub contains: &'static [&'static str],
     /// Numbers of its law that are known beforehand, and yet are claimed with it.
     pub fixed: usize,
-    /// Whether the misfit has so many valleys over its size that fits start from sizes all over its range.
+    /// Whether the misfit has many local minima over its size, so that fits start from sizes all over its range.
     pub scanned: bool,
-    /// Its forces along a motion as sums of a few, for each choice of its nonlinear numbers; none where it is only simulated.
+    /// Its forces along a motion as sums of a few, for each choice of its nonlinear parameters; none where it is only simulated.
     pub(crate) spans: fn(&Hypothesis, &Seen) -> Vec<Span>,
 }
 
@@ -181,7 +181,7 @@ impl Seen {
     }
 }
 
-/// Forces along a motion that a law can have with the same nonlinear numbers: sums of the forces of a few sets of its parameters, each times a factor.
+/// Forces along a motion that a law can have with the same nonlinear parameters: sums of the forces of a few sets of its parameters, each times a factor.
 #[derive(Debug, Clone)]
 pub(crate) struct Span {
     /// Parameters whose forces span all of them.
@@ -264,7 +264,7 @@ impl Physics {
     }
 }
 
-/// Where a physics sits.
+/// Where an effect acts.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Place {
     /// Between two bodies, or a body and `ground`.
@@ -292,7 +292,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// A number that a hypothesis adds.
+/// A parameter that a hypothesis adds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Its name in a verdict.
@@ -313,12 +313,12 @@ pub struct Parameter {
     pub in_samples: bool,
 }
 
-/// A physics at a place.
+/// An effect at a place.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
     /// Such as `coulomb@drum-ground`: unique among the hypotheses of a model.
     pub id: String,
-    /// Which physics.
+    /// Which effect.
     pub physics: &'static Physics,
     /// Where it sits.
     pub place: Place,
@@ -328,7 +328,7 @@ pub struct Hypothesis {
     pub parameters: Vec<Parameter>,
     /// Where fits start, most plausible first: one value for each parameter.
     pub starts: Vec<Vec<f64>>,
-    /// Path of a number that the model states and that does the same; nothing is gained where a fit has that one free.
+    /// Path of a parameter that the model states and that does the same; nothing is gained where a fit has that one free.
     pub same_as: Option<String>,
     /// Equal for hypotheses that no recording can tell apart.
     pub class: String,
@@ -338,7 +338,7 @@ pub struct Hypothesis {
 /// What a hypothesis does to a model.
 #[derive(Debug, Clone)]
 pub(super) enum Form {
-    /// Puts an element, new or in the place of another.
+    /// Adds an element, or replaces one.
     Element(ElementForm),
     /// Sets a key of an input or output.
     Key { path: String },
@@ -346,7 +346,8 @@ pub(super) enum Form {
     Inertia { body: String },
     /// Adds a body behind the elements of a joint, and a spring and a damper from it to the joint's other end.
     Series { joint: [String; 2], body: String, spring: String, damper: String },
-    /// Hangs a free body on another by an element of this kind, whose parameters but the last are those of the kind in the hypothesis' order; the last is the body's inertia.
+    /// Hangs a free body on another by an element of this kind. The last parameter of the hypothesis is the body's inertia; the others are those of the
+    /// kind, in the hypothesis' order.
     Hung { on: String, body: String, element: String, kind: &'static Kind },
 }
 

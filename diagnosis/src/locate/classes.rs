@@ -26,8 +26,8 @@ pub(super) fn response(equations: &Equations, frequency_hz: f64) -> Option<DVect
     read.iter().all(|c| c.re.is_finite() && c.im.is_finite()).then_some(read)
 }
 
-/// Normalised residual that is left where a force at one place is explained by a force of the same course, of any size, at another: root of the mean
-/// square over samples and outputs, in noise standard deviations. `own` and `other` are responses at the frequencies of the spectrum.
+/// Normalised residual that remains where a force at one place is explained by a force of the same course, of any size, at another. It is the root of the
+/// mean square over samples and outputs, in noise standard deviations. `own` and `other` are responses at the frequencies of the spectrum.
 pub(super) fn distance(spectrum: &Spectrum, own: &[DVector<Complex<f64>>], other: &[DVector<Complex<f64>>], noise: &[f64]) -> f64 {
     let (mut both, mut square, mut all) = (Complex::new(0.0, 0.0), 0.0, 0.0);
     for ((_, power), (a, b)) in spectrum.iter().zip(own.iter().zip(other)) {

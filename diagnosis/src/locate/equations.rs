@@ -88,8 +88,8 @@ impl<'a> Linearisation<'a> {
         Some(Linearisation { model, linear, nonlinear, inverse_inertia })
     }
 
-    /// The same equations with an error of every nonlinear element's force as further states: each is a first-order Markov process with the
-    /// standard deviation `sizes` (N) and the corner `rate` (1/s).
+    /// The same equations with an error of every nonlinear element's force as further states. Each is a first-order Markov process with the standard
+    /// deviation `sizes` (N) and the corner `rate` (1/s).
     pub fn with_force_errors(&self, equations: &Equations, sizes: &[f64], rate: f64) -> Equations {
         let (n, count, rows) = (equations.a.nrows(), equations.b.ncols(), equations.h.nrows());
         let wider = |m: &DMatrix<f64>, more: &DMatrix<f64>, height: usize| {

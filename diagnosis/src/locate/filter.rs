@@ -48,8 +48,8 @@ pub(super) struct Gains {
     pub log_det: f64,
 }
 
-/// What is known of a run: residuals of the nominal model (a column for each output row), forces of nonlinear elements beyond their linear part, and
-/// a known part of the unknown; the latter two may be empty.
+/// The known data of a run: residuals of the nominal model (a column for each output row), forces of nonlinear elements beyond their linear part, and a
+/// known part of the unknown. The latter two may be empty.
 #[derive(Clone, Copy)]
 pub(super) struct Data<'a> {
     pub residual: &'a [Vec<f64>],

@@ -36,12 +36,12 @@ pub enum Variable {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
-    /// In proportion: one number.
+    /// In proportion: one parameter.
     Proportional,
     /// As a polynomial of third order; over velocity with one of second order for each direction that differ only in their even terms' sign:
     /// `c0 + c1 sign(v) + c2 v + c3 v |v|`.
     Smooth,
-    /// As its mean in each bin says.
+    /// By its mean in each bin.
     Binned,
 }
 
@@ -77,8 +77,8 @@ pub struct Law {
     pub f_statistic: f64,
     /// Probability of so large a statistic where there is no law.
     pub p_value: f64,
-    /// Gain in log-likelihood of the recordings over the smoother without a law, less half the logarithm of the independent samples for each
-    /// number of the law; `None` where it was not computed.
+    /// Gain in log-likelihood of the recordings over the smoother without a law. Half the logarithm of the independent samples is subtracted for each
+    /// parameter of the law. `None` where it was not computed.
     pub evidence: Option<f64>,
     /// The curve; of a proportional law the bins that it runs through.
     pub curve: Vec<Point>,

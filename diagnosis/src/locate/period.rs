@@ -64,7 +64,7 @@ fn strongest(x: &[f64], v: &[f64], force: &[f64]) -> Option<Vec<Ripple>> {
     let mut spectrum = transform.make_output_vec();
     transform.process(&mut sums, &mut spectrum).ok()?;
     let turns = |line: usize| line as f64 * CELLS as f64 / PADDED as f64;
-    // Finer than what a step from sample to sample passes over, nothing can be told.
+    // Periods shorter than the step from sample to sample cannot be resolved.
     let mut steps: Vec<f64> = x.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let middle = steps.len() / 2;
     let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;

@@ -1,5 +1,5 @@
-//! The laws that a force may follow: it is regressed on everything that moves at its place, and each law is tested on parts of the recordings that it
-//! was not fitted to.
+//! The laws that a force may follow. The force is regressed on everything that moves at its place, and each law is tested on held-out parts of the
+//! recordings.
 
 use super::law::{Form, Law, Point, Variable};
 use super::period::{Ripple, least_squares};
@@ -146,7 +146,7 @@ impl Samples {
         let place = |z: f64| -> f64 {
             match bins {
                 Bins::Even(_) => (z - low) / (high - low).max(f64::MIN_POSITIVE),
-                // Finer about zero, and with an edge at it.
+                // Finer about zero, and with a boundary at it.
                 Bins::FinerAtZero(_) => 0.5 + 0.5 * (BOW * z / rms).asinh() / (BOW * peak / rms).asinh(),
                 Bins::Log(_) => 1.0 + (z.abs() / peak).max(1e-3).log10() / 3.0,
             }
@@ -205,7 +205,7 @@ impl Bins {
     }
 }
 
-/// Bins of a curve; even, so that one edge is at zero.
+/// Bins of a curve; even, so that one boundary is at zero.
 const BINS: usize = 32;
 /// How much finer bins are about zero.
 const BOW: f64 = 3.0;

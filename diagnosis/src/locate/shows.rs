@@ -1,4 +1,4 @@
-//! When, at which frequencies and in which state the residual shows, and which places cannot be told apart.
+//! When, at which frequencies and in which state the residual shows, and which places cannot be separated.
 
 use super::channel::Channel;
 use super::classes;

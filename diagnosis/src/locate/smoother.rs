@@ -119,7 +119,7 @@ impl System {
         Some(self.finish(states, deviations, data, log_likelihood))
     }
 
-    /// The forward pass; `jumps` says of each sample whether the unknown may jump there.
+    /// The forward pass; `jumps` marks the samples at which the unknown may jump.
     fn filter_with_jumps(&self, steady: &Steady, q: &DMatrix<f64>, data: Data, jumps: &[bool], jump: f64) -> Option<Forward> {
         let (n, p, len) = (self.n, self.p, jumps.len());
         let extra = (jump / self.scale[self.unknown]).powi(2);

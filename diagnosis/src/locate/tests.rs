@@ -1,4 +1,4 @@
-//! Devices with known hidden physics: simulated with it, located without.
+//! Devices with known hidden effects: simulated with them, located without.
 
 use super::filter::{Data, System};
 use super::*;

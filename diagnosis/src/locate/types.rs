@@ -155,7 +155,7 @@ pub struct Candidate {
     pub courses: Vec<Course>,
 }
 
-/// Places that no sensor tells apart: a force of the same course at one or the other gives the same readings within the noise.
+/// Places that no sensor separates: a force of the same course at one or the other gives the same readings within the noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Class {
     /// Indices into [`Location::ranking`], best first.
@@ -182,7 +182,7 @@ pub struct Location {
     pub mismatch: f64,
     /// Places, best first.
     pub ranking: Vec<Candidate>,
-    /// Classes of places that cannot be told apart; every place is in one.
+    /// Classes of places that cannot be separated; every place is in one.
     pub classes: Vec<Class>,
     /// When and in which state.
     pub shows: Where,

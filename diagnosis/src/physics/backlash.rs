@@ -1,11 +1,11 @@
-//! A joint with play: it stands in the place of the joint's spring and damper, or holds a load that the model does not have.
+//! A joint with backlash: it replaces the joint's spring and damper, or holds a load that the model does not have.
 
 use crate::hypothesis::builder::{ElementBuilder, any, even, first_value, hung, log};
 use crate::hypothesis::sites::{Reach, Site, Sites};
 use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
 use backdrive_plant::model::InputKind;
 
-/// The word that sets a play with round edges apart.
+/// The word that distinguishes a backlash with a rounded contact law.
 const ROUND: &str = "round";
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -93,7 +93,7 @@ const LOSS: f64 = 0.1;
 /// Rounding that a fit starts from, in a gap.
 const BLUNT: f64 = 0.2;
 
-/// A sharp play as fitted, its edges a little blunt: how sharp they are is how finely it is resolved, and no other physics.
+/// A sharp backlash as fitted, its contact slightly rounded. Its sharpness is a matter of resolution, not another effect.
 fn blunted(values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     let [gap, ..] = values else { return None };
     let start: Vec<f64> = values.iter().copied().chain(std::iter::once(BLUNT * gap)).collect();

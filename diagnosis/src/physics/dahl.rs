@@ -4,8 +4,8 @@ use crate::hypothesis::ForceSpan;
 use crate::hypothesis::builder::{ElementBuilder, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
-/// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only
-/// imitates the steps of whoever simulated or sampled it.
+/// Largest stiffness, in units of the recordings' force divided by their displacement, at which a build-up of friction over a distance could show. Stiffer,
+/// it is dry friction, and a fit only imitates the steps of the simulation or of the sampling.
 pub(super) const STIFFEST: f64 = 1e4;
 
 /// Displacements over which the friction builds up that are looked at along a motion, in its travel.

@@ -1,7 +1,7 @@
 //! A delay of an actuator or a sensor.
 //!
-//! Where a motion drives the model its recording may come late beside the others, or the force beside it be a command that acts later: the
-//! motion then has a negative delay. That of the only output beside a motion is the motion's own: both shift one signal against the other.
+//! Where a motion drives the model, its recording may be late relative to the others, or the force may be a command that acts later. The motion then has a
+//! negative delay. The delay of the only output beside a motion is the motion's own: both shift one signal against the other.
 
 use crate::hypothesis::ForceSpan;
 use crate::hypothesis::builder::{even, key, only_input_and_output};

@@ -5,8 +5,8 @@ use crate::hypothesis::ForceSpan;
 use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
-/// The least speed that is looked at along a motion, in that of nine tenths of the time: a friction that turns its direction over a little displacement, and a
-/// motion that is known to a step, look like less friction at rest below that.
+/// The least speed used along a motion, as a share of the 0.9 quantile of speed. Below it two other causes look like less friction at rest: friction that
+/// changes its direction over a small displacement, and a motion that is known only to a step.
 const SLOWEST: f64 = 0.1;
 
 pub(super) const PHYSICS: Physics = Physics {

@@ -1,4 +1,4 @@
-//! A spring whose force runs on one line when it is stretched and on another when it is let go.
+//! A spring whose force follows one line when it is stretched and another when it is released.
 
 use crate::hypothesis::builder::{ElementBuilder, even, log};
 use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};

@@ -1,4 +1,4 @@
-//! Inertia that a body has beyond what the model says.
+//! Inertia of a body in excess of the model's value.
 
 use crate::hypothesis::builder::{even, inertia, stated};
 use crate::hypothesis::sites::{Reach, Site};

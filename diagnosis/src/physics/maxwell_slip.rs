@@ -50,8 +50,8 @@ pub(super) const PHYSICS: Physics = Physics {
     },
 };
 
-/// Values with which `finer`, this law at the same place with more sliders, does nearly what `coarse` does with its own: those that carry most are
-/// parted in two, one that slips earlier and one that slips later. How many sliders there are is how finely a loop is resolved, and no physics.
+/// Values with which `finer`, this law at the same place with more sliders, nearly reproduces `coarse`: those that carry most are parted in two, one that
+/// slips earlier and one that slips later. The number of sliders is the resolution of a loop, not another effect.
 fn split(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     let (from, to) = (values.len() / 2, finer.parameters.len() / 2);
     if values.len() != coarse.parameters.len() || !(from < to && to <= 2 * from) {

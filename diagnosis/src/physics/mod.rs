@@ -1,4 +1,4 @@
-//! The physics that a model may have left out: one file each, which holds everything that diagnosis knows of it, and one line here.
+//! The effects that a model may lack: one file each, which holds everything that diagnosis knows of it, and one line here.
 
 #[cfg(test)]
 mod tests;
@@ -72,12 +72,12 @@ pub fn all(model: &Model, scales: &Scales) -> Vec<Hypothesis> {
     PHYSICS.iter().flat_map(|physics| (physics.propose)(&sites)).collect()
 }
 
-/// What is known of the physics of this name.
+/// What is known of the effect of this name.
 pub fn physics_named(name: &str) -> Option<&'static Physics> {
     PHYSICS.iter().copied().find(|p| p.name == name)
 }
 
-/// Whether one physics has another as a special or limiting case.
+/// Whether one effect has another as a special or limiting case.
 pub(crate) fn contains(physics: &Physics, simpler: &Physics) -> bool {
     physics.facts.contains.contains(&simpler.name)
 }
@@ -98,7 +98,7 @@ pub fn withheld(names: &[&str]) -> Vec<&'static str> {
     }
 }
 
-/// The hypotheses that are left when these physics, and all that contain one of them, are withheld.
+/// The hypotheses that remain when these effects, and all that contain one of them, are withheld.
 pub fn without(hypotheses: Vec<Hypothesis>, names: &[&str]) -> Vec<Hypothesis> {
     let gone = withheld(names);
     hypotheses.into_iter().filter(|h| !gone.contains(&h.physics.name)).collect()

@@ -2,8 +2,8 @@
 
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
-/// A name that verdicts and `--without` know, without hypotheses of its own: `maxwell_slip` has the same memory with its parameters free, and
-/// what a search makes of both as rivals has not been measured.
+/// A name that verdicts and `--without` know, without hypotheses of its own. `maxwell_slip` has the same memory with its parameters free, and the result of
+/// a search with both as rivals has not been measured.
 pub(super) const PHYSICS: Physics = Physics {
     name: "preisach_lugre",
     family: Family::Friction,

@@ -142,7 +142,7 @@ fn every_kind_that_can_be_simulated_is_proposed() {
             let ones: Vec<Vec<f64>> = k.parameters.iter().map(|_| vec![1.0]).collect();
             !matches!((k.build)(&ones), Err(e) if e.contains("not available"))
         });
-        // Its curves are loops that were measured, not numbers that a search could move; maxwell_slip is proposed for the same memory.
+        // Its curves are loops that were measured, not parameters that a search could move; maxwell_slip is proposed for the same memory.
         let measured = physics.name == "preisach_lugre";
         assert_eq!(proposed.contains(&physics.name), can && !measured, "{}", physics.name);
     }
@@ -415,7 +415,7 @@ fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
                         law.advance(&mut memory, 0.0, x, 1e-3);
                         law.force(&memory, x, 0.0)
                     };
-                    // What an edge rounded over w gives at the edge itself is w/2 of twist, and nowhere more.
+                    // A contact rounded over w gives w/2 of twist at the contact itself, and nowhere more.
                     assert!((pull(&round) - pull(&sharp)).abs() <= 0.5 * start[3] * values[1] * (1.0 + 1e-9), "{name}: {} at {x}", fine.id);
                 }
                 pairs += 1;
@@ -455,7 +455,7 @@ fn friction_laws_begin_at_the_level_of_the_one_before() {
     assert!(["coulomb", "asymmetric_coulomb", "stribeck", "lugre"].iter().all(|law| seen.contains(law)), "{seen:?}");
 }
 
-/// Keys of inputs and outputs that are physics where a model file does not state them.
+/// Keys of inputs and outputs that are effects where a model file does not state them.
 const SIGNAL_KEYS: [&str; 6] = ["gain", "saturation", "delay", "bandwidth", "back_emf", "offset"];
 
 #[test]
@@ -466,7 +466,7 @@ fn every_physics_is_an_element_kind_a_key_of_a_signal_or_a_body() {
         let kind = KINDS.iter().find(|k| k.name == name);
         let of_signal = SIGNAL_KEYS.contains(&physics.name);
         assert!(kind.is_some() || of_signal || ["inertia", "series_compliance"].contains(&physics.name), "{}", physics.name);
-        // What it says of its parameters is what the model file calls them.
+        // The keys of its parameters are those of the model file.
         let keys: Vec<&str> =
             kind.map_or(vec![physics.name, "stiffness", "damping", "inertia"], |k| k.parameters.iter().map(|p| p.key).collect());
         for key in physics.facts.sliding.iter().chain(physics.facts.from_level).chain([&physics.size]) {

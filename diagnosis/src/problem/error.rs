@@ -8,7 +8,7 @@ use backdrive_plant::tomlfile::FileError;
 /// Why there is nothing to diagnose.
 #[derive(Debug, thiserror::Error)]
 pub enum ProblemError {
-    /// A file cannot be read, or says something impossible.
+    /// A file cannot be read, or has impossible content.
     #[error(transparent)]
     File(#[from] FileError),
     /// A bag cannot be read.

@@ -12,7 +12,7 @@ use std::path::Path;
 /// Samples of a signal that are read of a bag of which no rows are named: the first. A search is given far fewer, and memory is not to grow with a bag.
 pub const MOST_OF_A_BAG: usize = 1_000_000;
 
-/// The inputs that a set says nobody measured.
+/// The inputs that a set declares unmeasured.
 pub(super) fn unknown_of(set: &RecordingSet, model: &Model) -> Result<Vec<Unknown>, ProblemError> {
     let one = |(name, bandwidth_hz): &(String, f64)| {
         let place = set.folder.join("set.toml");

@@ -1,5 +1,5 @@
-//! A recording whose clock is irregular, on the times at which it was logged: what drives a simulation on a grid fine enough for them, and where on
-//! that grid each sample was taken.
+//! A recording whose clock is irregular, on the times at which it was logged. The inputs of a simulation are on a grid fine enough for these times, and
+//! each sample has its place on that grid.
 
 use crate::tuning::tuning;
 use backdrive_plant::model::{Hold, Input, Model};

@@ -117,7 +117,7 @@ impl Problem {
             for file in files {
                 match record(set, file, &model, &unknown) {
                     Ok(record) => records.push(record),
-                    // One short file says nothing, and does not keep the others from being diagnosed.
+                    // One short file carries no information, and does not keep the others from being diagnosed.
                     Err(ProblemError::Short { name, count, .. }) => left_out.push((name, count)),
                     Err(error) => return Err(error),
                 }
@@ -160,11 +160,11 @@ impl Problem {
         Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown, left_out, noise_sd, inverse: None, lag })
     }
 
-    /// The same without the outputs that stand at one value throughout while another moves: a sensor that is dead or at its rail says nothing of the device, and
-    /// has no noise to hold a residual against. The names of what was left out.
+    /// The same without the outputs that stand at one value throughout while another moves. A sensor that is dead or at its rail carries no information on
+    /// the device, and has no noise to normalise a residual. Also the names of the omitted outputs.
     pub fn without_dead_outputs(self) -> (Problem, Vec<String>) {
         let is_still = |output: usize| {
-            // The same value in all of them: a device may also stand still in each recording, elsewhere in the next.
+            // The same value in all of them: a device may also stand still in each recording, at another position in the next.
             let mut samples = self.fit.iter().chain(&self.held_out).filter_map(|r| r.compared(output)).flatten();
             samples.next().is_some_and(|first| samples.all(|x| x == first))
         };
@@ -205,7 +205,7 @@ impl Problem {
 /// What a problem that was turned round is of.
 #[derive(Debug, Clone)]
 pub struct Inverse {
-    /// The problem as it was recorded.
+    /// The problem before it was inverted.
     pub recorded: Arc<Problem>,
     /// The output that is now the motion.
     pub motion: String,
@@ -214,8 +214,8 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Edits of the model that was turned round, as those of the model as its file has it. A motion that is ahead of its recording is a force that acts late; the
-    /// other way round no model of a device that is driven by forces can have it.
+    /// Edits of the inverted model, converted to edits of the model in its file. A motion that is ahead of its recording is a force that acts late. The
+    /// opposite case cannot occur in a model of a device that is driven by forces.
     pub fn in_file(&self, edits: Vec<Edit>) -> Vec<Edit> {
         let delay = format!("inputs.{}.delay", self.motion);
         let one = |edit: Edit| match edit {
@@ -255,14 +255,14 @@ mod tests {
         let (left, dead) = problem(&|t| t * t, [9.999847; 2]).without_dead_outputs();
         assert_eq!(dead, ["v"]);
         assert!(left.fit.iter().chain(&left.held_out).all(|r| r.outputs[0].is_some() && r.outputs[1].is_none()));
-        // Still in each recording, and elsewhere in the next, is no rail.
+        // Still in each recording, and at another position in the next, is no rail.
         assert!(problem(&|t| t * t, [1.0, 2.0]).without_dead_outputs().1.is_empty());
         // An effect on the way of a signal that nobody measured is part of what is fitted as that signal.
         let mut unmeasured = problem(&|t| t * t, [1.0, 2.0]);
         assert!(!unmeasured.is_unmeasured(&Place::Signal("f".to_string())));
         unmeasured.unknown = vec![Unknown { input: 0, bandwidth_hz: 2.0 }];
         assert!(unmeasured.is_unmeasured(&Place::Signal("f".to_string())) && !unmeasured.is_unmeasured(&Place::Signal("x".to_string())));
-        // Where nothing moves the device may be stuck, and the audit says what there is to say.
+        // Where nothing moves the device may be stuck, and the audit reports that.
         let (left, dead) = problem(&|_| 0.0, [9.999847; 2]).without_dead_outputs();
         assert!(dead.is_empty() && left.fit[0].outputs[1].is_some());
     }

@@ -1,4 +1,4 @@
-//! Single samples that no device can have made: what a sensor says while it wakes up, a lost frame.
+//! Single samples that no device can have made, such as those of a sensor that starts up, or a lost frame.
 
 use crate::tuning::tuning;
 

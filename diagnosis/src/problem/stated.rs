@@ -4,14 +4,14 @@ use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::parse::{InputKey, NumberOf, OutputKey};
 
-/// A number that the nominal file states, and that may be off.
+/// A parameter that the nominal file states, and that may be off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
     /// Its path, as [`Model::values_at`] takes it.
     pub path: String,
     /// Its place where the path leads to a list.
     pub index: usize,
-    /// What the file says.
+    /// The value in the file.
     pub given: f64,
     /// Lowest and highest value that a fit may try.
     pub range: (f64, f64),
@@ -20,7 +20,7 @@ pub struct Stated {
 }
 
 impl Stated {
-    /// The body whose inertia it is, by its index in the model; `None` where it is another number.
+    /// The body whose inertia it is, by its index in the model; `None` where it is another parameter.
     pub fn body(&self, model: &Model) -> Option<usize> {
         match model.number_at(&self.path) {
             Ok(NumberOf::Body(body)) => Some(body),
@@ -29,7 +29,7 @@ impl Stated {
     }
 }
 
-/// Numbers that the file states. Those that are 0 have no scale: what they would add is physics, not a number.
+/// Parameters that the file states. Those that are 0 have no scale: what they would add is an effect, not a parameter.
 pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
     let keys = stated_keys(text);
     let writes_elements = keys.iter().any(|k| k.starts_with("elements."));
@@ -60,7 +60,7 @@ pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
     found
 }
 
-/// Whether it is a number of an input or an output that may be off. The offset of an input is set where its recording is made; resolution and noise of
+/// Whether it is a parameter of an input or an output that may be off. The offset of an input is set where its recording is made; resolution and noise of
 /// an output do not move its prediction.
 fn is_of_signal(number: NumberOf) -> bool {
     match number {
@@ -76,7 +76,7 @@ fn is_of_signal(number: NumberOf) -> bool {
     }
 }
 
-/// Whether a number cannot have any effect: the inertia of a prescribed body whose reaction nobody reads.
+/// Whether a parameter cannot have any effect: the inertia of a prescribed body whose reaction nobody reads.
 fn is_idle(model: &Model, path: &str) -> bool {
     let Ok(NumberOf::Body(body)) = model.number_at(path) else { return false };
     let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);

@@ -14,8 +14,8 @@ impl Problem {
         tuning().fit.middle_substeps.max(2 * self.following())
     }
 
-    /// Substeps in which the motion turns by a part of its period that a law can be stepped over. Its angular frequency is that of its steps from sample to sample over its
-    /// size, both root mean square and without the noise, at the output that stands out of its noise most.
+    /// Substeps in which the motion turns by a part of its period that a law can be stepped over. Its angular frequency is that of its steps from sample to
+    /// sample divided by its size, both root mean square and without the noise. It is taken at the output with the largest ratio of signal to noise.
     fn following(&self) -> usize {
         let fit = &tuning().fit;
         let best = (0..self.model.outputs.len()).filter_map(|output| self.turning(output)).max_by(|a, b| a.1.total_cmp(&b.1));

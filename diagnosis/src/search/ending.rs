@@ -15,8 +15,8 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
 
-/// An effect may only have helped the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
-/// parameters has to win over those that it contains. One such step may open the next.
+/// An effect may only have helped the other parameters out of a local minimum. So each effect of the best structure is removed again, and the others are
+/// refitted from their present values. A law of many parameters must also be better than the laws that it contains. One such step may open the next.
 pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &Work) {
     let samples = course.nominal.fit.residuals.len();
     let last = course.evaluator.within(work.up_to(tuning().search.best_end));
@@ -30,8 +30,8 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
     }
 }
 
-/// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
-/// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
+/// Fits those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that compensate the
+/// integration error of few substeps. So it is judged, and continued, with as many substeps as the model asks for, even where the time is up.
 pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], nominal: &Candidate, work: &Work) {
     let samples = nominal.fit.residuals.len();
     let exact_end = work.share(tuning().search.best_end).max(work.budget.spent() + work.share(tuning().search.refitted));
@@ -67,8 +67,9 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     sort(found, samples);
 }
 
-/// An effect that may be nothing may only have led the parameters around a bend: from the best, each such effect is taken back in steps while all else is
-/// fitted along (continuation), and where the rest may start from then. A fit from elsewhere does not get there through a curved valley.
+/// An effect that may be nothing may only have guided the parameters around a curved valley of the cost. So, from the best, each such effect is driven to
+/// zero in steps while all other parameters are refitted (continuation). Gives the starts for the remaining parameters. A fit from another start does not
+/// get there through a curved valley.
 pub(super) fn taken_back(evaluator: &Evaluator, found: &mut [Candidate], work: &Work) -> Vec<(Structure, Vec<f64>)> {
     let problem = evaluator.problem;
     let Some(best) = found.first_mut() else { return Vec::new() };
@@ -172,8 +173,8 @@ pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f6
     fitted.map(|(structure, fit)| candidate(evaluator, structure.clone(), fit)).collect()
 }
 
-/// The best with each of its effects left out, where there is more than one, or as a simpler law that it contains, and where to start: from where all
-/// else is.
+/// The best with each of its effects left out, where there is more than one, or replaced by a simpler law that it contains. Also where to start: from the
+/// present values of all other parameters.
 fn fewer(course: &Course, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
     let problem = course.evaluator.problem;
     let Some(best) = found.first() else { return Vec::new() };

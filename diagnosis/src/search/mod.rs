@@ -1,4 +1,4 @@
-//! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
+//! Which effects the model lacks: from the nominal model, refitted, to the structures that explain the recordings best.
 
 mod ending;
 mod journal;
@@ -111,7 +111,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     })
 }
 
-/// What may be missing: everything that is no stated number, each class once.
+/// What may be missing: everything that is no stated parameter, each class once.
 fn hypotheses_for(nominal: &Nominal, settings: &Settings) -> Vec<Hypothesis> {
     let problem = nominal.evaluator.problem;
     let withheld: Vec<&str> = settings.without.iter().map(String::as_str).collect();

@@ -72,7 +72,8 @@ struct Coupler<'p, 'a> {
 }
 
 impl<'a> Coupler<'_, 'a> {
-    /// The nominal model coupled, from some values, with so many times the full strength, in excerpts of the recordings where those are enough.
+    /// The nominal model coupled, from some values. The coupling gain is `strength` times the full one. Only excerpts of the recordings are used where
+    /// those are enough.
     fn couple(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<CoupledNominal<'a>> {
         let (evaluator, structure, fit) = (self.evaluator, self.structure, &tuning().fit);
         let coupling = self.pulled.then(|| self.firm.with(strength * self.firm.strength));
@@ -99,12 +100,12 @@ impl<'a> Coupler<'_, 'a> {
         self.evaluator.fit(self.structure, &again.values, effort).filter(|fit| fit.cost < other.cost)
     }
 
-    /// Where the nominal model explains the recordings as it is coupled, every physics looks as good as any other: so with other strengths, until it
-    /// leaves enough.
+    /// Where the coupled nominal model explains the recordings, all effects look equally good. So other coupling gains are tried, until the residual is
+    /// large enough.
     fn until_it_shows(&self, mut coupled: CoupledNominal<'a>, refitted: &Fit) -> CoupledNominal<'a> {
         let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
         let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(refitted));
-        // On parts the parameters may take on what differs from one part to the next: the first time only.
+        // On parts the parameters may absorb the differences from one part to the next: the first time only.
         for (nth, strength) in tuning().search.couplings.iter().enumerate() {
             if left(&coupled.fit) > enough {
                 break;
@@ -269,8 +270,8 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Mostly few numbers are wrong: the one, and the two, that explain most where all others are as given, and from there all. Numbers that go together draw
-/// a fit of all of them into valleys from which it does not come back. `None` where the refit leaves white noise, or is no worse.
+/// Usually only a few parameters are wrong. So the one, and the two, that explain most while all others are as given are fitted first, and then all.
+/// Strongly correlated parameters drive a full refit into a local minimum. `None` where the refit leaves white noise, or is no worse.
 fn few_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], refitted: &Fit) -> Option<Fit> {
     let white = |fit: &Fit| white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals));
     let stated: Vec<&Role> = structure.free.iter().map(|n| &n.role).filter(|role| matches!(role, Role::Stated(_))).collect();
@@ -299,7 +300,7 @@ fn few_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], refitt
     None
 }
 
-/// Near the noise the end of a fit counts: the residual short of it looks like missing physics.
+/// Near the noise the end of a fit counts: the residual short of it looks like a missing effect.
 pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
     let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < tuning().noise.far);
     if !near || white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals)) {

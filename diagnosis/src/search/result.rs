@@ -19,14 +19,14 @@ pub struct Tried {
     pub taken: Option<f64>,
 }
 
-/// The smallest size of a physics that the recordings would have shown.
+/// The smallest size of an effect that the recordings would have shown.
 #[derive(Debug, Clone)]
 pub struct Detectable {
     /// Its name.
     pub physics: &'static str,
     /// Where.
     pub place: Place,
-    /// The parameter that says how large it is.
+    /// The parameter that gives its size.
     pub key: String,
     /// Its size.
     pub size: f64,
@@ -37,9 +37,9 @@ pub struct Detectable {
 /// What a search found.
 #[derive(Debug)]
 pub struct Search {
-    /// What is off in the predictions of the refitted nominal model although no physics is missing.
+    /// Errors in the predictions of the refitted nominal model although no effect is missing.
     pub errors: Vec<BudgetedError>,
-    /// What the refitted nominal model says of inputs that are held by default.
+    /// The evidence of the refitted nominal model on inputs that are held by default.
     pub holds: Vec<Told>,
     /// Standard deviation of each output's measuring error, in its unit.
     pub noise_sd: Vec<f64>,
@@ -57,7 +57,7 @@ pub struct Search {
     pub samples: usize,
     /// Number of residuals of the held-out recordings.
     pub unseen_samples: usize,
-    /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
+    /// What would have been seen with the refitted nominal model, each effect at the place where it shows best.
     pub detectable: Vec<Detectable>,
     /// Simulations of a recording.
     pub simulations: u64,

@@ -14,7 +14,7 @@ pub struct Settings {
     pub effects: usize,
     /// How much it may compute, as a multiple of what it does by default: the verdict depends on this, and not on how fast or busy a machine is.
     pub effort: f64,
-    /// How long it may take on the clock, all in all. What that cuts off may differ from machine to machine, so a verdict says where it did.
+    /// Limit on the wall-clock time of the whole search. What it cuts off may differ from machine to machine, so a verdict reports where it did.
     pub patience: Duration,
 }
 

@@ -29,7 +29,7 @@ pub(super) struct State<'s, 'a> {
     pub found: Vec<Candidate>,
     /// Single effects, what promises most first.
     pub singles: std::vec::IntoIter<Seed>,
-    /// Laws that bring one number more than the nominal model has.
+    /// Laws that have one parameter more than the nominal model.
     pub one_parameter: std::vec::IntoIter<Seed>,
     /// Effects at once.
     pub effects: usize,
@@ -150,8 +150,8 @@ impl<'s, 'a> State<'s, 'a> {
         singles
     }
 
-    /// To first order a law may do no more than the nominal model's parameters do together, so that screening sees nothing of it, and still be what is
-    /// missing: where the residual is small those that bring one number more are fitted whatever they promise.
+    /// To first order a law may do no more than the nominal model's parameters do together, so that screening does not detect it. It may still be the
+    /// missing effect. So, where the residual is small, all laws that add one parameter are fitted, whatever their screening value.
     fn of_one_number(&self) -> Vec<Seed> {
         let Some(view) = self.views.first().filter(|_| !self.far) else { return Vec::new() };
         let (problem, known) = (self.course.evaluator.problem, self.course.nominal.structure.free.len());

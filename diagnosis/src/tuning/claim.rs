@@ -9,7 +9,7 @@ group! {
         least_advantage: f64 = 30.0, "criterion", Statistics("10 is very strong evidence for one alternative (Kass & Raftery 1995); some hundred hypotheses are tried, each at several starts, which adds 2 ln 500 = 12");
         /// Share of the cost that an effect has to remove.
         least_share: f64 = 0.02, "-", Numerics("what coarse substeps and an inexact simulator may cost");
-        /// Advantage below which two structures cannot be told apart.
+        /// Advantage below which two structures cannot be distinguished.
         alike: f64 = 6.0, "criterion", Statistics("strong evidence begins there (Kass & Raftery 1995)");
         /// Standard deviations of its size within which an effect may be nothing.
         may_be_nothing: f64 = 3.0, "standard deviations", Statistics("one in 400 by chance, of effects that screening picked from some hundred");

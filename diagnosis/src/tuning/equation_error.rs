@@ -25,7 +25,7 @@ group! {
         stretches: usize = 8, "stretches", Statistics("enough for a standard error, each with several reversals");
         /// Speed below which a body is at rest, in the speed that it exceeds for a tenth of the time.
         at_rest: f64 = 0.03, "-", Judgement("slower, presliding and noise of the motion decide how dry friction turns, and no law over speed");
-        /// Share of the mean error of the best structure below which the error of a stretch says nothing.
+        /// Share of the mean error of the best structure below which the error of a stretch carries no information.
         floor: f64 = 0.1, "-", Judgement("a tenth of the noise: a device that rests is predicted exactly by any law");
         /// Structures whose extensions by one more law are looked at.
         extended: usize = 8, "structures", Cost("all pairs are looked at; a third law is looked for beside the best of them");
@@ -45,7 +45,7 @@ group! {
         confidence: [f64; 7] = [1.927, -0.353, 1.375, 1.749, 0.507, 0.0, 0.129], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
         /// The same of its kind.
         kind_confidence: [f64; 7] = [1.571, 1.0, 0.947, 2.285, 0.149, 0.0, -0.135], "log-odds", Measured("as `confidence`");
-        /// Confidence of all laws of a structure from which others that predict as well are not told beside it.
+        /// Confidence of all laws of a structure from which others that predict as well are not reported beside it.
         claimed: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
         /// Share of the force that none of the laws explains above which something is missing that has no name.
         much_left: f64 = 0.3, "-", Judgement("a tenth of the variance: friction of real joints that is left out takes more");

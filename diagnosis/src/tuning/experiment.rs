@@ -5,11 +5,11 @@ use super::table::group;
 group! {
     /// How the next experiment is chosen. Its menu of excitations is in `experiment/menu.rs`.
     Experiment {
-        /// Separation at which explanations count as told apart.
+        /// Separation at which an experiment decides between explanations.
         wanted: f64 = 5.0, "standard deviations", Statistics("its square is the difference of costs; half of it beyond claim.alike's doubt");
         /// Repeats of an experiment, at most.
         most_repeats: u64 = 10, "repeats", Judgement("nobody plays more");
-        /// Rivals that are told apart, at most.
+        /// Rivals that are separated, at most.
         rivals: usize = 4, "structures", Cost("each pair is simulated for each excitation");
         /// Experiments that are compared by a true refit.
         finalists: usize = 3, "experiments", Cost("two fits each");

@@ -44,7 +44,7 @@ group! {
         less_damping: f64 = 0.1, "-", Numerics("Marquardt 1963");
         /// Factor on the damping after a step that did less than half of what was predicted.
         keep_damping: f64 = 0.4, "-", Numerics("between less_damping and none");
-        /// Share of the predicted decrease below which derivatives are computed anew.
+        /// Share of the predicted decrease below which derivatives are recomputed.
         as_predicted: f64 = 0.3, "-", Numerics("a quarter is the usual level below which a model of the cost is not trusted (Nocedal & Wright 2006, ch. 4)");
         /// Steps that derivatives are carried along by the secant update, at most.
         secant_steps: usize = 4, "Gauss-Newton steps", Cost("each spares one simulation per parameter; Broyden updates lose accuracy with each");
@@ -78,7 +78,7 @@ group! {
         start_samples: usize = 16, "samples", Judgement("twenty periods of the sample clock are short beside what a device does, and tell a speed");
         /// Standard deviation of those before data, as a share of their largest value.
         start_prior: f64 = 0.3, "-", Judgement("wider than any start that was measured");
-        /// Weights of an unknown input that are moved together for derivatives, one in so many.
+        /// Spacing of the weights of an unknown input that are moved together for derivatives.
         knots_apart: usize = 6, "knots", Numerics("a cubic B-spline acts over four; two more for what the device remembers");
         /// Angle by which the measured motion may turn in a substep of first steps.
         turn: f64 = 0.4, "rad", Numerics("a law stepped over by that is in error by about a twelfth of its square, a percent");

@@ -25,19 +25,19 @@ group! {
         settled: usize = 400, "samples", Numerics("1e-3 of a covariance that decays over 60 samples");
         /// Normalised residual (rms) up to which nothing is said to show.
         quiet: f64 = 1.02, "rms", Statistics("half of noise.at_noise's excess");
-        /// Difference of normalised residuals below which two places cannot be told apart.
+        /// Difference of normalised residuals below which two places cannot be separated.
         indistinct: f64 = 0.3, "rms", Judgement("of a misfit of 2 and more: as much as the linearisation errs by");
         /// Displacement that makes a turning point, in rms displacements.
         turn: f64 = 0.05, "-", Judgement("smaller reversals are noise");
         /// Share of the force that a richer law has to explain beyond another one.
         clearly: f64 = 0.03, "-", Judgement("the estimated force errs by that");
-        /// Ratio of amplitudes below which no exponent is told.
+        /// Ratio of amplitudes below which no exponent is reported.
         range: f64 = 1.5, "-", Statistics("an exponent of 1 +- 0.2 needs forces known to 8 % over less");
         /// Distance over which dry friction builds up, in rms displacements.
         slip: f64 = 1e-3, "-", Numerics("smooth enough for a linearisation along the motion");
         /// Passes over the travel that a ripple makes, at least.
         ripple_turns: f64 = 2.0, "passes", Statistics("one pass cannot be told from a trend");
-        /// Ripples told apart, at most.
+        /// Ripples distinguished, at most.
         ripples: usize = 3, "ripples", Cost("motors have cogging, commutation, and a gear");
     }
 }

@@ -97,7 +97,7 @@ impl Tuning {
     /// Puts this tuning to use, for a study of how much verdicts depend on it. It has to be called before anything is diagnosed.
     ///
     /// # Errors
-    /// When another one is in use: it is given back.
+    /// When another one is in use: this one is returned in the error.
     #[allow(clippy::result_large_err)]
     pub fn adopt(self) -> Result<(), Tuning> {
         IN_USE.set(self)

@@ -13,7 +13,7 @@ group! {
         least_noise: f64 = 1e-6, "-", Numerics("seven digits of a CSV file");
         /// Samples of a record, at least.
         fewest_samples: usize = 50, "samples", Statistics("fewer say nothing of a device with three parameters and noise");
-        /// Samples of all fitted recordings, at most; of more, one in so many is taken.
+        /// Samples of all fitted recordings, at most; of more, every n-th is taken.
         most_samples: usize = 60_000, "samples", Cost("a search simulates some thousand times; numbers known from so many are known to a third of a percent of what one sample says");
         /// What that may change in a prediction, in noise standard deviations.
         thinned_error: f64 = 0.1, "noise standard deviations", Statistics("it adds a hundredth to the mean square of the noise");

@@ -57,7 +57,7 @@ group! {
         laws: u64 = 120_000_000, "simulation steps", Cost("a tenth of the work");
         /// Work in which each record is fitted by itself.
         per_record: u64 = 100_000_000, "simulation steps", Cost("an eighth of the work, after the search");
-        /// Share of the work for refits that begin with few of the stated numbers.
+        /// Share of the work for refits that begin with few of the stated parameters.
         few_first: f64 = 0.05, "-", Cost("a sixth of what single effects get; models of usual stiffness need a hundredth");
         /// Steps in which an effect that may be nothing is taken back, as shares of its size.
         taken_back: [f64; 4] = [0.6, 0.3, 0.1, 0.02], "-", Numerics("each fit starts from the one before: the last step is within what the next can follow");

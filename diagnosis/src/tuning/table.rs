@@ -49,7 +49,7 @@ pub struct Row {
 pub trait Quantity {
     /// As a table shows it.
     fn shown(&self) -> String;
-    /// So many times it; whole numbers are rounded.
+    /// Multiplies it by a factor; integers are rounded.
     fn times(&mut self, factor: f64);
     /// This value, in all of a list.
     fn set(&mut self, value: f64);

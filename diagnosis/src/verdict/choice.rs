@@ -1,4 +1,4 @@
-//! Which of the structures is claimed, and which cannot be told from it.
+//! Which of the structures is claimed, and which cannot be distinguished from it.
 
 use super::plausible::{is_at_bound, is_plausible};
 use crate::candidate::{Candidate, advantage_over, key_of};
@@ -22,7 +22,7 @@ pub fn chosen(search: &Search) -> &Candidate {
         let so_many = || search.found.iter().filter(|c| c.structure.added.len() == effects && is_plausible(c));
         let Some(next) = so_many().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)) else { continue };
         let next = so_many().fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
-        // Ties go to the fewest parameters, then to the physics that is named first.
+        // Ties go to the fewest parameters, then to the effect that is named first.
         let simplest = so_many()
             .filter(|c| evidence(search, c, next) < tuning().claim.alike || is_enough(search, c, next))
             .min_by_key(|c| (c.structure.free.len(), c.structure.added.iter().map(order).sum::<usize>()))
@@ -34,8 +34,9 @@ pub fn chosen(search: &Search) -> &Candidate {
     best
 }
 
-/// Whether a law of fewer parameters is enough where one that contains it, at the same place, fits better: that one has to predict better by more than its
-/// own variation, and to remove a good part of what the simpler one leaves beyond the noise. On a real device one more number always helps a little.
+/// Whether a law of fewer parameters is enough where one that contains it, at the same place, fits better. The richer law must predict better by more than
+/// its own variation. It must also remove a good part of what the simpler one leaves beyond the noise. On a real device one more parameter always helps a
+/// little.
 fn is_enough(search: &Search, simple: &Candidate, rich: &Candidate) -> bool {
     if simple.structure.free.len() >= rich.structure.free.len() || !is_contained(simple, rich) {
         return false;
@@ -64,7 +65,7 @@ fn mean_square(search: &Search, c: &Candidate) -> f64 {
     (c.fit.cost + unseen) / (search.samples + unseen_samples).max(1) as f64
 }
 
-/// The same, with its numbers let go where those of the other were, too.
+/// The same, with its parameters released where those of the other were, too.
 fn mean_square_let_go(search: &Search, c: &Candidate, beside: &Candidate) -> f64 {
     let (Some(own), Some(_)) = on_unseen(c, beside) else { return mean_square(search, c) };
     (c.fit.cost + own.mean_square * search.unseen_samples as f64) / (search.samples + search.unseen_samples).max(1) as f64
@@ -81,9 +82,9 @@ pub(super) fn everywhere(base: &Candidate, better: &Candidate) -> Option<Gain> {
     }
 }
 
-/// Whether an effect predicts recordings that no fit has seen better: by more than that varies from block to block, and by enough to be of use. Where the
-/// nominal model predicts them down to the noise already they cannot say, and the fitted ones do; and where there are none. What errors of the
-/// integration and of the clock come to is no improvement.
+/// Whether an effect predicts held-out data better: by more than the gain varies from block to block, and by enough to be of use. Where the nominal model
+/// already predicts them down to the noise, or where there are none, the fitted recordings decide. An improvement within the errors of the integration and
+/// of the clock does not count.
 fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     let no_physics = beside_noise(&search.errors);
     let of_use = |a: f64, b: f64| a.sqrt() - b.sqrt() > tuning().claim.useful * b.sqrt().max(1.0) && a - b > no_physics;
@@ -93,8 +94,8 @@ fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     };
     match (&base.unseen, &better.unseen) {
         (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => {
-            // A device that drifts freely may end elsewhere after the least difference. Where the fits explain all there is, it is enough that the unseen
-            // recordings do not speak against it.
+            // A device that drifts freely may end in another place after the least difference. Where the fits explain all there is, it is enough that the
+            // unseen recordings are no evidence against it.
             let at_floor = |c: &Candidate| c.levels.iter().all(|level| *level < tuning().noise.unexplained);
             let explained = at_floor(better) && !at_floor(base);
             a.gain_over(b).is_none_or(|gain| gain.is_sure() || explained && gain.mean > 0.0)
@@ -115,13 +116,13 @@ fn order(h: &Hypothesis) -> usize {
 /// criteria with effective samples.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     let evidence = advantage_over(base, better, search.samples) + unseen_evidence(search, base, better);
-    // What irregular clocks and sensors come to tells no two apart.
+    // An error of the size of that of irregular clocks and sensors separates no two structures.
     let least = of_sensors(&search.errors);
     let apart = mean_square_let_go(search, base, better) - mean_square_let_go(search, better, base);
     if apart.abs() < least { evidence.clamp(-0.5 * tuning().claim.alike, 0.5 * tuning().claim.alike) } else { evidence }
 }
 
-/// What two candidates leave on the held-out recordings, with their numbers let go where both were.
+/// Residuals of two candidates on the held-out recordings, with released parameters where both have them.
 fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c HeldOut>, Option<&'c HeldOut>) {
     match (&base.released, &better.released) {
         (Some(a), Some(b)) => (Some(a), Some(b)),
@@ -129,7 +130,7 @@ fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c Held
     }
 }
 
-/// Whether a candidate of as many effects as the best fits nearly as well, and is told from it by the held-out recordings.
+/// Whether a candidate of as many effects as the best fits nearly as well, and the held-out recordings decide between the two.
 pub(crate) fn decided_by_unseen(search: &Search, c: &Candidate, best: &Candidate) -> bool {
     let alike = tuning().claim.alike;
     c.structure.added.len() == best.structure.added.len()
@@ -156,7 +157,7 @@ fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
         && predicts(search, base, better)
 }
 
-/// Structures of as many effects that cannot be told from the best: another place, or a law that does not contain its own.
+/// Structures of as many effects that cannot be distinguished from the best: another place, or a law that does not contain its own.
 pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
     let differs = |c: &Candidate| match exchanged(best, c) {
         (own, other) if own.len() == 1 && other.len() == 1 => {
@@ -196,15 +197,16 @@ fn is_finer_than(simple: &Candidate, rich: &Candidate) -> bool {
     }
 }
 
-/// A law with more numbers that fits as well as the one that is claimed.
+/// A law with more parameters that fits as well as the one that is claimed.
 pub(super) struct Richer<'s> {
     pub candidate: &'s Candidate,
     /// Whether the one that is claimed is a special or limiting case of it, in the same place.
     pub contains: bool,
 }
 
-/// Structures that lose for their numbers alone: one effect exchanged for a law with more of them, which fits as well. That a simpler law is preferred says nothing of
-/// what the device does where it was not recorded. The simplest first; none where the best leaves more than noise, for there a richer law fits what is none of its own.
+/// Structures that lose only because of their number of parameters: one effect is exchanged for a law with more of them, which fits as well. The preference
+/// for a simpler law is no evidence on the device outside the recorded range. The simplest first. None where the best leaves more than noise, for there a
+/// richer law fits what is not its own.
 pub(super) fn richer<'s>(search: &'s Search, best: &Candidate) -> Vec<Richer<'s>> {
     if best.levels.iter().any(|level| *level > tuning().noise.unexplained) {
         return Vec::new();
@@ -245,12 +247,12 @@ pub(super) fn nearest<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candi
     rivals
 }
 
-/// Whether a physics has another one as a special or limiting case, or is the same.
+/// Whether an effect has another one as a special or limiting case, or is the same.
 fn has_as_limit(rich: &Physics, own: &Physics) -> bool {
     withheld(&[own.name]).contains(&rich.name)
 }
 
-/// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
+/// Whether an effect has another one, or one of its family at the same place, as a special or limiting case.
 pub(super) fn contains(rich: &Physics, own: &Hypothesis) -> bool {
     withheld(&[own.physics.name]).contains(&rich.name) || rich.family == own.physics.family
 }

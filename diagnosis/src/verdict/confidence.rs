@@ -1,7 +1,7 @@
-//! How sure a finding is: the probability that physics and place are right, from what the recordings say for it and against its rivals.
+//! The confidence of a finding: the probability that effect and place are right, from the evidence of the recordings for it and against its rivals.
 //!
-//! A logistic regression over a few figures of each finding, whose coefficients were found on drawn cases with a sealed truth and judged on others
-//! (docs/diagnosis.md says how, and what the reliability is).
+//! A logistic regression over a few figures of each finding. Its coefficients were found on drawn cases with a sealed truth and judged on others
+//! (docs/diagnosis.md describes how, and gives the reliability).
 
 use super::choice::{contains, everywhere, evidence};
 use crate::candidate::Candidate;
@@ -85,12 +85,12 @@ pub(super) fn without<'s>(search: &'s Search, best: &Candidate, which: usize) ->
     search.found.iter().filter(is_rest).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)).unwrap_or(&search.nominal)
 }
 
-/// The probability that a finding with these figures is right in physics and place.
+/// The probability that a finding with these figures is right in effect and place.
 pub(super) fn probability(figures: &Figures) -> f64 {
     logistic(&tuning().claim.confidence, figures)
 }
 
-/// The probability that some physics of its family is at its place, whichever.
+/// The probability that some effect of its family is at its place, whichever.
 pub(super) fn probability_of_family(figures: &Figures) -> f64 {
     logistic(&tuning().claim.family_confidence, figures)
 }

@@ -26,7 +26,7 @@ pub(super) struct Decision<'s> {
     pub(super) spread: Uncertainty,
     /// What it adds, most important first.
     pub(super) findings: Vec<Finding>,
-    /// Structures that cannot be told from it.
+    /// Structures that cannot be distinguished from it.
     pub(super) alike: Vec<&'s Candidate>,
     /// Times at which a sensor is far off, s.
     pub(super) bursts: Vec<[f64; 2]>,
@@ -42,7 +42,7 @@ pub(super) struct Decision<'s> {
     pub(super) doubt: Option<Doubt>,
     /// Share of the force that none of the laws explains, where they were looked at on forces: what counts as noise there.
     pub(super) left_of_force: Option<f64>,
-    /// What the search on forces says, where there was one.
+    /// Result of the search on forces, where there was one.
     pub(super) forces: Option<&'s OnForces>,
 }
 
@@ -55,7 +55,7 @@ pub(super) enum Doubt {
     WorseThanRefit,
     /// The model as given simulates the motion of held-out recordings better.
     WorseSimulated,
-    /// A number is at an end of what the fit may try.
+    /// A parameter is at an end of what the fit may try.
     AtAnEnd,
 }
 
@@ -79,7 +79,7 @@ pub fn without_what_may_be_nothing(problem: &Problem, search: &mut Search) {
     }
 }
 
-/// Whether an effect may be nothing: the interval of each of its numbers that can undo it holds the value at which it does, that of its size among them.
+/// Whether an effect may be nothing. The interval of its size, and of each other parameter that can cancel the effect, then contains the neutral value.
 fn may_be_nothing(best: &Candidate, spread: &Uncertainty, which: usize) -> bool {
     let Some(hypothesis) = best.structure.added.get(which) else { return false };
     let holds = |(number, n): (usize, &FreeParameter)| {
@@ -154,8 +154,8 @@ fn left_of_force(problem: &Problem, search: &Search) -> f64 {
     search.noise_sd.iter().enumerate().filter_map(one).fold(0.0, f64::max)
 }
 
-/// Root mean square of what a candidate leaves on the held-out recordings, where that is far beyond the noise and beyond what it leaves on the fitted ones: numbers
-/// may bend to the recordings that they are fitted to, and what they bend to shows elsewhere.
+/// Root mean square of what a candidate leaves on the held-out recordings, where that is far beyond the noise and beyond what it leaves on the fitted ones.
+/// Parameters may adapt to the recordings that they are fitted to, and the resulting error shows on other recordings.
 fn far_on_unseen(best: &Candidate, floors: &[f64]) -> Option<f64> {
     let unseen = best.unseen.as_ref()?.mean_square.sqrt();
     let most = best.levels.iter().chain(floors).fold(1.0f64, |a, b| a.max(*b));
@@ -187,7 +187,7 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
     advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < tuning().claim.refit_gains * cost
 }
 
-/// Where the stated parameters are among a structure's, and what the nominal file says.
+/// Where the stated parameters are among a structure's, and their values in the nominal file.
 fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
     let one = |(place, number): (usize, &FreeParameter)| match number.role {
         Role::Stated(i) => Some((place, problem.stated.get(i)?.given)),

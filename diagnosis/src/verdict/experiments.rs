@@ -15,8 +15,8 @@ use crate::work::Budget;
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-experiment.toml";
 
-/// What would tell rivals apart, confirm what remains, determine numbers or move the device, or why nothing would, and the excitation file; looked for
-/// with this budget. The decision is settled by it: two explanations are ambiguous where an experiment tells them apart.
+/// The experiment that would separate rivals, confirm what remains, determine parameters or move the device, or why none would, and the excitation file.
+/// The search for it has this budget. It completes the decision: two explanations are ambiguous where an experiment separates them.
 pub(super) fn next_experiment<'a, 's>(
     problem: &'a Problem,
     search: &'s Search,
@@ -53,8 +53,8 @@ fn planned<'a, 's>(
         }
     }
     if decision.word == Word::Missing || inseparable.is_some() {
-        // Of laws that contain one another the simpler is claimed as long as nothing speaks against it, and the experiment is to rule the richer one out; a law of more
-        // numbers that is another explanation leaves it open.
+        // Of laws that contain one another the simpler is claimed as long as there is no evidence against it, and the experiment is to rule the richer one
+        // out. A law of more parameters that is another explanation leaves it open.
         let (contained, others): (Vec<_>, Vec<_>) = richer(search, best).into_iter().partition(|rival| rival.contains);
         for rival in others.into_iter().chain(contained) {
             if let Ok(plan) = confirm(problem, [best, rival.candidate], rival.contains, &search.noise_sd, budget) {
@@ -87,7 +87,7 @@ fn is_kin(best: &Candidate, other: &Candidate) -> bool {
     own.len() == rest.len() && own.iter().all(|h| rest.iter().any(|o| o.place.same(&h.place) && o.physics.family == h.physics.family))
 }
 
-/// The experiment that determines what the recordings leave open, by the intervals that the verdict tells.
+/// The experiment that determines what the recordings leave open, by the intervals that the verdict reports.
 fn determine<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let best = decision.best;
     let all: Vec<usize> = (0..best.structure.free.len()).collect();

@@ -1,4 +1,4 @@
-//! What was found: each physics with its place, its parameters, and what else could stand there.
+//! What was found: each effect with its place, its parameters, and its alternatives.
 
 use super::choice::{behind, chosen, evidence, exchanged};
 use super::confidence::{Figures, figures, probability, probability_of_family, without};
@@ -15,7 +15,7 @@ use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
 
-/// Each physics of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
+/// Each effect of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
 /// and not among them.
 pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
     let is_companion = |which: usize| {
@@ -36,7 +36,7 @@ pub(super) fn is_timing_of(problem: &Problem, best: &Candidate, which: usize) ->
     best.structure.added.get(which).zip(values.get(which)).is_some_and(|(hypothesis, values)| is_timing(hypothesis, values, period))
 }
 
-/// The figures of every finding of a search, for those who calibrate its confidence: physics, place, figures.
+/// The figures of every finding of a search, for those who calibrate its confidence: effect, place, figures.
 pub fn figures_of(search: &Search) -> Vec<(String, String, Figures)> {
     let best = chosen(search);
     let one = |(which, h): (usize, &Hypothesis)| {
@@ -78,7 +78,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
     }
 }
 
-/// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
+/// A finding with rivals is not certain: the probability that it or one of its rivals is right is shared among them by how near they come.
 pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
     if search.forces.is_some() {
         return; // the beliefs contain the rivals already
@@ -89,7 +89,7 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
         let Some(own) = best.structure.added.iter().find(|h| is_it(h)) else { continue };
         let against: Vec<&Candidate> = rivals.iter().copied().filter(|c| exchanged(best, c).0.iter().any(|h| h.id == own.id)).collect();
         let others: f64 = against.iter().map(|c| weight(c)).sum();
-        // Of its kind are laws in its place; what stands elsewhere, or is of another kind, shares what is known of that.
+        // Of its kind are laws at its place; a law at another place, or of another kind, takes a share of the family's probability.
         let is_of_its_kind =
             |c: &&&Candidate| exchanged(best, c).1.iter().all(|h| h.place.same(&finding.place) && Some(h.physics.family) == finding.family);
         let other_kinds: f64 = against.iter().filter(|c| !is_of_its_kind(c)).map(|c| weight(c)).sum();
@@ -119,7 +119,7 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
     }
 }
 
-/// What stands in the place of one hypothesis in structures that are else the same, its structure, and how far it is behind.
+/// The alternative to one hypothesis in structures that are otherwise the same, its structure, and how far it is behind.
 fn rivals<'s>(search: &'s Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, &'s Candidate, f64)> {
     let own = &best.structure.added[which];
     let others: Vec<&str> = best.structure.added.iter().filter(|h| h.id != own.id).map(|h| h.id.as_str()).collect();
@@ -133,7 +133,7 @@ fn rivals<'s>(search: &'s Search, best: &Candidate, which: usize) -> Vec<(Hypoth
         }
     }
     found.sort_by(|a, b| a.2.total_cmp(&b.2));
-    // However finely a law is resolved, it is one physics.
+    // However finely a law is resolved, it is one effect.
     let same = |a: &Hypothesis, b: &Hypothesis| a.physics == b.physics && a.place.same(&b.place);
     let mut each: Vec<(Hypothesis, &Candidate, f64)> = Vec::new();
     for (rival, candidate, behind) in found {
@@ -189,7 +189,7 @@ pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -
     all
 }
 
-/// What would have been seen: for each physics the smallest size at the place where it shows best.
+/// What would have been seen: for each effect the smallest size at the place where it shows best.
 pub(super) fn detectable(search: &Search) -> Vec<Detectable> {
     let one = |d: &crate::search::Detectable| Detectable {
         physics: d.physics.to_string(),

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// An output that was measured in a record.
 type Pair<'p> = (&'p Record, usize);
 
-/// The errors; `use_best` says whether the diagnosed model is the best structure, or the nominal file as it is.
+/// The errors; `use_best` states whether the diagnosed model is the best structure, or the unchanged nominal file.
 pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> HeldOut {
     let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
     let nominal = &search.nominal.structure;

@@ -1,4 +1,4 @@
-//! What a search says: the verdict, the nominal model's file with what was found, and the files beside it.
+//! The result of a search: the verdict, the nominal model's file with what was found, and the files beside it.
 
 mod beaten;
 mod choice;
@@ -72,8 +72,8 @@ pub struct Files {
     pub experiment: Option<String>,
 }
 
-/// What a search says of a problem, and the files beside it. `remarks` are what the recordings say of themselves, `location` the latent force that
-/// the refitted nominal model needs, where it could be had; `limit` ends the look for the next experiment.
+/// The verdict of a search on a problem, and the files beside it. `remarks` are the audit's findings on the recordings. `location` is the latent force that
+/// the refitted nominal model needs, where it could be had. `limit` ends the search for the next experiment.
 ///
 /// # Errors
 /// When what was found cannot be written into the model's text.
@@ -118,8 +118,8 @@ pub fn verdict(
     Ok((verdict, Files { model, rivals, experiment }))
 }
 
-/// Errors on held-out recordings. Where what was found predicts them worse than the model as given does, that one is handed over as it is, and nothing is claimed as
-/// likelier than not.
+/// Errors on held-out recordings. Where what was found predicts them worse than the model as given does, the model as given is returned unchanged, and
+/// nothing is claimed as likelier than not.
 fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut decision::Decision) -> HeldOut {
     let errors = held_out(problem, search, decision.best, decision.changes);
     let is_worse_than = |other: Option<f64>| other.zip(errors.nrmse_after).is_some_and(|(other, after)| after > other);
@@ -161,7 +161,7 @@ fn is_worse_simulated(problem: &Problem, decision: &decision::Decision) -> bool 
     }
 }
 
-/// Whether a number of the nominal model, or the size of an effect, is at an end of what the fit may try.
+/// Whether a parameter of the nominal model, or the size of an effect, is at an end of what the fit may try.
 fn is_at_an_end(best: &Candidate) -> bool {
     let stated = best.structure.free.iter().zip(&best.fit.values).filter(|(number, _)| matches!(number.role, Role::Stated(_)));
     stated.into_iter().any(|(number, value)| number.at_bound(*value).is_some()) || !plausible::is_plausible(best)

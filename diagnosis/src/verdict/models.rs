@@ -18,7 +18,7 @@ pub enum VerdictError {
     /// Refitted parameters cannot be put into the model.
     #[error("the refitted numbers do not fit into the model: {0}")]
     Refitted(String),
-    /// A physics that was found cannot be put into the model.
+    /// An effect that was found cannot be put into the model.
     #[error(transparent)]
     Hypothesis(#[from] crate::hypothesis::HypothesisError),
 }

@@ -1,12 +1,12 @@
-//! What is never claimed, however well it fits: numbers that no device has, effects before their cause, and what is a matter of timing.
+//! What is never claimed, however well it fits: parameters that no device has, effects before their cause, and what is a matter of timing.
 
 use crate::candidate::Candidate;
 use crate::hypothesis::{Family, Hypothesis, Parameter};
 use crate::structure::{FreeParameter, Role};
 use crate::tuning::tuning;
 
-/// Whether every effect that a structure adds has numbers that a device may have: inside the documented range of its physics, and its size not at the end of
-/// what the fit may try, and surely not nothing.
+/// Whether every effect that a structure adds has plausible parameters, inside the documented range of the effect. Its size must not be at the end of what
+/// the fit may try, and must surely differ from nothing.
 pub(super) fn is_plausible(candidate: &Candidate) -> bool {
     added(candidate).all(|(hypothesis, parameter, number, value)| {
         let range = hypothesis.physics.facts.plausible.iter().find(|(key, _, _)| *key == parameter.key);
@@ -51,7 +51,7 @@ fn added(candidate: &Candidate) -> impl Iterator<Item = (&Hypothesis, &Parameter
     })
 }
 
-/// Whether a number is at an end of its range at which it still does something.
+/// Whether a parameter is at an end of its range at which it still has an effect.
 pub(crate) fn at_end(parameter: &Parameter, number: &FreeParameter, value: f64) -> bool {
     let at = number.at_bound(value);
     at.is_some() && at != parameter.neutral.and_then(|neutral| number.at_bound(neutral))

@@ -2,7 +2,7 @@
 
 use backdrive_plant::write::round_significant;
 
-/// Rounded to so many significant digits; `None` for what is no finite number, which JSON cannot hold.
+/// Rounded to `digits` significant digits; `None` for what is no finite number, which JSON cannot hold.
 pub(super) fn rounded(value: f64, digits: usize) -> Option<f64> {
     Some(round_significant(value, digits)).filter(|x| x.is_finite())
 }

@@ -84,7 +84,7 @@ fn asserted(finding: &Finding) -> String {
     if finding.has_likelier_rival() { known(finding) } else { words::finding(finding) }
 }
 
-/// What is known where the explanations cannot be told apart: the finding and its rivals that are at least half as likely, at most three.
+/// What is known where the explanations cannot be separated: the finding and its rivals that are at least half as likely, at most three.
 fn known(finding: &Finding) -> String {
     let near = finding
         .alternatives

@@ -9,8 +9,8 @@ use crate::tuning::tuning;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
 
-/// Times at which a motion sensor is far off for a moment while all the rest is measuring error, s: glitches, which no physics of the
-/// device makes. Empty where the rest is no measuring error, or a reversal of friction could be it.
+/// Times at which a motion sensor is far off for a moment while all the rest is measuring error, s: glitches, which no effect in the device causes. Empty
+/// where the rest is no measuring error, or a reversal of friction could be it.
 pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
     use backdrive_plant::model::OutputKind;
     let evaluator = Evaluator::new(problem);

@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::search::Search;
 use crate::tuning::tuning;
 
-/// What the best explanation shifts in time by so little that it says when samples were taken, and nothing of the device.
+/// Time shifts of the best explanation that are so small that they concern the sampling times, not the device.
 pub fn timing(problem: &Problem, search: &Search) -> Vec<Remark> {
     let best = chosen(search);
     let values = best.structure.added_of(&best.fit.values);

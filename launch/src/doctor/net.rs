@@ -46,7 +46,7 @@ fn multicast(interface: &Interface) -> Finding {
         let Some(ear) = listen(port, std::slice::from_ref(interface)) else { return Ok(false) };
         let mouth = UdpSocket::bind((interface.address, 0))?;
         let on = libc::in_addr { s_addr: u32::from(interface.address).to_be() };
-        // SAFETY: the address lives as long as the call and has the size that is told.
+        // SAFETY: the address lives as long as the call and has the size that is passed.
         let set = unsafe {
             let length = size_of::<libc::in_addr>() as libc::socklen_t;
             libc::setsockopt(mouth.as_raw_fd(), libc::IPPROTO_IP, libc::IP_MULTICAST_IF, (&raw const on).cast(), length)
@@ -93,12 +93,12 @@ fn granted() -> Option<u64> {
     let socket = UdpSocket::bind("127.0.0.1:0").ok()?;
     let (wanted, mut got): (libc::c_int, libc::c_int) = (8 << 20, 0);
     let mut length = size_of::<libc::c_int>() as libc::socklen_t;
-    // SAFETY: the values live as long as the calls, and have the sizes that are told.
+    // SAFETY: the values live as long as the calls, and have the sizes that are passed.
     let asked = unsafe {
         libc::setsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, libc::SO_RCVBUF, (&raw const wanted).cast(), length);
         libc::getsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, libc::SO_RCVBUF, (&raw mut got).cast(), &mut length)
     };
-    // The kernel says twice what it keeps for payloads.
+    // The kernel reports twice what it keeps for payloads.
     (asked == 0).then_some(got as u64 / 2)
 }
 

@@ -16,7 +16,7 @@ pub const COLUMNS: [(&str, &str); 8] = [
     ("effort", "force on the master in contact, root mean square"),
 ];
 
-/// The edge in a word.
+/// The critical gain in a word.
 pub fn edge(cell: &Cell, highest: f64) -> String {
     match (cell.critical_gain, cell.stable_up_to) {
         (Some(critical), _) => number(critical),

@@ -8,9 +8,9 @@ pub struct Compared<'a> {
     pub session: String,
     /// What the hand does there.
     pub title: &'a str,
-    /// mu and lambda at which the numbers are told.
+    /// mu and lambda at which the results are given.
     pub gains: [f64; 2],
-    /// Highest mu*lambda up to which edges were looked for.
+    /// Highest mu*lambda up to which critical gains were searched.
     pub highest: f64,
     /// The cells that were done, condition by condition.
     pub cells: Vec<Cell>,

@@ -1,4 +1,4 @@
-//! The force that gave the physics away, the law over it, and the places that compete.
+//! The force that revealed the effect, the law over it, and the places that compete.
 
 use super::phrases::adds;
 use crate::parts::{file_name, sentence};
@@ -43,7 +43,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     places(page, found, location);
 }
 
-/// A finding's physics and place in words, as a title.
+/// A finding's effect and place in words, as a title.
 pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
     sentence(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
@@ -85,7 +85,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
     let loose = loose(main, &evidence.force_unit);
-    // A law of velocity over displacement is a fence of jumps that says nothing: loops are drawn of what depends on the path.
+    // A law of velocity over displacement is a fence of jumps without information: loops are drawn of what depends on the path.
     if loose.is_none()
         && !main.latent.displacement.is_empty()
         && !matches!(evidence.against, Against::Velocity | Against::Acceleration | Against::Time)
@@ -126,7 +126,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     }
 }
 
-/// Says so where the sensors leave the force so open that its cloud cannot speak for or against a law.
+/// A sentence for the case that the sensors leave the force so uncertain that its cloud is no evidence for or against a law.
 fn loose(main: &Trace, unit: &str) -> Option<String> {
     let mut wide: Vec<f64> = main.deviation.iter().copied().filter(|d| d.is_finite()).collect();
     wide.sort_by(f64::total_cmp);
@@ -234,7 +234,7 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
     at..at + size
 }
 
-/// The force at the place that explains most, where no physics was named.
+/// The force at the place that explains most, where no effect was named.
 fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
     let motion = found.problem.model.motion;
     let unit = if matches!(place.place, Place::Between(..)) { unit_for(motion, "N") } else { String::new() };

@@ -1,4 +1,4 @@
-//! Measured beside predicted, and what is left over.
+//! Measured beside predicted, and the residual.
 
 use super::phrases::adds;
 use crate::parts::file_name;
@@ -77,7 +77,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     )));
 }
 
-/// Whole record, the part where the models differ most, and what is left over in time and frequency.
+/// Whole record, the part where the models differ most, and the residual in time and frequency.
 fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     let problem = &found.problem;
     let (Some(Some(measured)), Some(shown)) = (three.record.outputs.get(output), problem.model.outputs.get(output)) else { return };

@@ -1,10 +1,10 @@
-//! What every part of the page says in the same way.
+//! Phrases that every part of the page uses in the same way.
 
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::verdict::Word;
 use backdrive_report::Tone;
 
-/// Whether a candidate adds any physics.
+/// Whether a candidate adds any effect.
 pub(super) fn adds(candidate: &Candidate) -> bool {
     !candidate.structure.added.is_empty()
 }

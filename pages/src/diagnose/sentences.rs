@@ -1,4 +1,4 @@
-//! What a verdict of one axis says in words, for terminal and page.
+//! The verdict of one axis in words, for terminal and page.
 
 use backdrive_diagnosis::error_budget::{BudgetedError, Source};
 use backdrive_diagnosis::hypothesis::Family;
@@ -74,7 +74,8 @@ pub fn shows(place: &Where) -> String {
     parts.join("; ")
 }
 
-/// What is off although no physics is missing, where it is a tenth of the noise or more: `noise of a motion that drives the model 0.93 (force)`.
+/// Errors of predictions although no effect is missing, where they are a tenth of the noise or more: `noise of a motion that drives the model 0.93
+/// (force)`.
 pub fn errors(budget: &[BudgetedError]) -> Option<String> {
     let told = |source: Source| match source {
         Source::Integration => "integration",

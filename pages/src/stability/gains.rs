@@ -13,7 +13,7 @@ const BARE: f64 = 90.0;
 /// One gain of a sweep, and what the loop did at it.
 pub type Point = (f64, Run);
 
-/// The sweep, or the search for the edge where nothing was swept.
+/// The sweep, or the search for the critical gain where nothing was swept.
 pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
     let again = found.resimulated.as_ref();
     let swept: Vec<(f64, Outcome)> = match again {
@@ -43,7 +43,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         let lo = grid.iter().copied().fold(f64::INFINITY, f64::min);
         let hi = grid.iter().copied().fold(0.0, f64::max);
         let gains = if lo < hi { spaced(lo, hi) } else { vec![asked] };
-        // Beyond the edge the distance is counted below zero, so that the curve crosses zero where the loop does.
+        // Beyond the stability limit the distance is counted below zero, so that the curve crosses zero where the loop does.
         let signed = |g: &f64| {
             let answer = frequency.at(*g);
             let distance = answer.margins.map_or(f64::NAN, |m| m.modulus);

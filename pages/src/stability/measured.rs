@@ -1,4 +1,4 @@
-//! The loop as it was measured: Nyquist and Bode plots, edges and their intervals.
+//! The measured loop: Nyquist and Bode plots, critical gains and their intervals.
 
 use super::words::interval;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, si};
@@ -108,7 +108,7 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     });
 }
 
-/// One curve per amplitude, with discs, and where it meets the edge.
+/// One curve per amplitude, with discs, and where it meets the stability limit.
 fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Plot {
     let mut plot = Plot::new(&format!("{title}Nyquist plot of the loop L")).x_axis("Re L", "").y_axis("Im L", "").equal_aspect();
     plot = plot.include(1.0, 0.0).include(0.0, 0.0);
@@ -116,7 +116,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         (0..=180).map(|k| (f64::from(k) * TAU / 180.0).sin_cos()).map(|(s, c)| (c, s)).unzip();
     plot = plot.series(Series::line("|L| = 1", &circle_re, &circle_im).colour(Colour::Muted).dash(Dash::Dotted).width(1.0));
     let mut seen = Vec::new();
-    // Frequencies are written at the curve whose edge comes first.
+    // Frequencies are written at the curve with the lowest critical gain.
     let first = first_edge(found);
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by_key(|i| first == Some(*i)); // the curve that decides last, on top
@@ -126,13 +126,13 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         seen.extend(re.iter().copied().zip(im.iter().copied()));
         let every = axis.l.len().div_ceil(DISCS).max(1);
         let thin = |v: &[f64]| v.iter().step_by(every).copied().collect::<Vec<f64>>();
-        // Uncertainty decides only where a disc comes near +1; elsewhere discs would smear the curve.
+        // Uncertainty decides only where a disc comes near +1; in other places discs would smear the curve.
         let near = |k: usize, r: f64| re.get(k).zip(im.get(k)).is_some_and(|(re, im)| (re - 1.0).hypot(*im) - r < NEAR_CRITICAL);
         let all = axis.sigma.iter().map(|s| DISC_95 * gain * s).enumerate();
         let radius: Vec<f64> = all.map(|(k, r)| if near(k, r) { r } else { f64::NAN }).collect();
         let name = level_name(level, found.len());
         let disc_name = if found.len() == 1 { "95 % discs" } else { "" };
-        // Of several amplitudes that with the lowest edge decides: its colour is the frequency, the others stay behind it.
+        // Of several amplitudes that with the lowest critical gain decides: its colour is the frequency, the others stay behind it.
         let leads = first == Some(i);
         let colour = if leads { Colour::Nth(0) } else { Colour::Muted };
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(colour));
@@ -197,7 +197,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
         let n = axis.l.len();
         let spread = |k: usize| INTERVAL_95 * gain * axis.sigma.get(k).copied().unwrap_or(f64::NAN);
         let values: Vec<f64> = (0..n).map(|k| db(size(k))).collect();
-        // A line that is told is at least three standard deviations, so its interval stays above zero.
+        // A line that carries information is at least three standard deviations, so its interval stays above zero.
         let lower: Vec<f64> = (0..n).map(|k| db(size(k) - spread(k))).collect();
         let upper: Vec<f64> = (0..n).map(|k| db(size(k) + spread(k))).collect();
         let band = if found.len() == 1 { "95 % interval" } else { "" };
@@ -220,19 +220,19 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
     Figure::stacked([magnitude, phase, coherence])
 }
 
-/// Which of the estimates has the lowest edge.
+/// Which of the estimates has the lowest critical gain.
 fn first_edge(found: &[(&LevelEstimate, &AxisEstimate)]) -> Option<usize> {
     let edge = |i: &usize| found.get(*i).and_then(|(_, a)| a.edge.gain).unwrap_or(f64::INFINITY);
     (0..found.len()).min_by(|a, b| edge(a).total_cmp(&edge(b)))
 }
 
-/// L at a line that tells something, per unit gain.
+/// L at a line that carries information, per unit gain.
 fn told(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
     let told = axis.told.get(line).copied().unwrap_or(false);
     axis.l.get(line).copied().filter(|l| told && l.iter().all(|v| v.is_finite()))
 }
 
-/// Phase over the lines that are told, degrees, without jumps of a turn between neighbours.
+/// Phase over the lines that carry information, degrees, without jumps of a turn between neighbours.
 fn unwrapped(axis: &AxisEstimate) -> Vec<f64> {
     let mut before: Option<f64> = None;
     (0..axis.l.len())

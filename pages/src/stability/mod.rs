@@ -119,7 +119,7 @@ fn lead(found: &Answer) -> String {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
         }
-        // Beyond a clamp or an end of the travel no edge can be seen.
+        // Beyond a clamp or an end of the travel no critical gain can be seen.
         (None, Some(least)) if least < found.gain.product() => {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" It is stable only up to μλ = {}{by}.", number(least))
@@ -130,7 +130,7 @@ fn lead(found: &Answer) -> String {
     format!("{verdict}.{edge}")
 }
 
-/// Each method's verdict and edge.
+/// Each method's verdict and critical gain.
 fn methods(found: &Answer) -> Table {
     let mut table = Table::new(["method", "verdict", "critical μλ", "95 % interval", "frequency", "why"]);
     let edge = |gain: Option<f64>, least: Option<f64>| match (gain, least) {

@@ -11,7 +11,7 @@ pub struct Question<'a> {
     pub words: &'a str,
     /// Answers to choose from; none where anything may be said.
     pub choices: Vec<String>,
-    /// The answer of who says nothing.
+    /// The answer where the user gives none.
     pub default: Option<String>,
 }
 
@@ -106,7 +106,7 @@ impl<R: BufRead, W: Write> Asker<R, W> {
         }
     }
 
-    /// To whoever sits there; where that is gone nobody can be told.
+    /// Writes to the user at the terminal; where the terminal is gone the text is lost.
     fn tell(&mut self, text: &str) {
         let _ = self.told.write_all(text.as_bytes()).and_then(|()| self.told.flush());
     }

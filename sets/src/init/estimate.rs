@@ -1,8 +1,14 @@
-//! Numbers to start from: inertia, damping and stiffness of one body, from what drives it and what it does.
+//! Parameters to start from: inertia, damping and stiffness of one body, from what drives it and what it does.
 //!
-//! Multiplied by a bump g that vanishes at both ends together with its slope, and integrated by parts, the equation of motion
-//! f = m x'' + b x' + k x + c becomes  ∫g f = m ∫g''x - b ∫g'x + k ∫g x + c ∫g: linear in the unknowns, and nothing measured is differentiated
-//! (Shinbrot 1957, modulating functions). One such row for every place of the bump, and least squares.
+//! The equation of motion f = m x'' + b x' + k x + c is multiplied by a bump g that vanishes at both ends together with its slope.
+//! Integration by parts gives
+//!
+//! ```text
+//! ∫g f = m ∫g''x - b ∫g'x + k ∫g x + c ∫g
+//! ```
+//!
+//! This is linear in the unknowns, and nothing measured is differentiated (Shinbrot 1957, modulating functions). One such row for every place of
+//! the bump, and least squares.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -49,7 +55,7 @@ pub fn estimate(shown: &[Shown], with_spring: bool) -> Option<Numbers> {
     Some(Numbers { damping, ..best })
 }
 
-/// Share of the force that remains unexplained, and the numbers.
+/// Share of the force that remains unexplained, and the parameters.
 fn at_width(shown: &[Shown], width: usize, with_spring: bool) -> Option<(f64, Numbers)> {
     let unknowns = if with_spring { 4 } else { 3 };
     let (mut rows, mut right) = (Vec::new(), Vec::new());

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// A column of a table, or a field of a bag's topic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// As it is shown and asked for: a heading, or TOPIC.FIELD.
+    /// The name by which it is shown and asked for: a heading, or TOPIC.FIELD.
     pub name: String,
     /// Where it stands.
     pub source: Source,
@@ -22,7 +22,7 @@ pub struct Column {
     pub unit: Option<Unit>,
     /// The unit that its heading states, where that is not known.
     pub unknown_unit: Option<String>,
-    /// Whether its type says that its values are in SI units.
+    /// Whether its type states that its values are in SI units.
     pub is_si: bool,
 }
 
@@ -136,7 +136,7 @@ pub fn recordings(options: &Options) -> Result<Recordings, InitError> {
     Ok(Recordings { paths, names, columns, partial, unread, made })
 }
 
-/// A path as it is called from a folder; a whole one where it lies elsewhere.
+/// A path relative to a folder; the whole path where it lies outside.
 fn name_in(folder: &Path, path: &Path) -> String {
     let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let path = whole(path);
@@ -147,7 +147,7 @@ impl Recordings {
     /// The column that is meant: by its heading, or by its name where that is one column's only.
     ///
     /// # Errors
-    /// A sentence that says what there is.
+    /// A sentence that lists what there is.
     pub fn column(&self, text: &str) -> Result<Column, String> {
         let by = |is: &dyn Fn(&Column) -> bool| -> Vec<&Column> { self.columns.iter().filter(|c| is(c)).collect() };
         let whole = by(&|c| c.name == text);

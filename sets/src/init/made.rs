@@ -10,7 +10,7 @@ use tempfile::TempDir;
 /// Folder of these bags, in that of the set.
 const BAGS: &str = "bags";
 
-/// What a column of times is called, in this order, where nobody says it.
+/// Names of a column of times, in this order, where nobody states it.
 const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
 /// Bags that were made, beside their places until all else is known.

@@ -1,7 +1,7 @@
 //! A model and a set for recordings of one's own.
 //!
-//! [`prepare`] looks at what the files hold, asks what nothing says ([`ask::Asker`]; an option, a terminal or a default answers), estimates
-//! numbers to start from, and gives the texts of both files ([`Prepared`]). It writes nothing but bags of tables, once it is told to
+//! [`prepare`] reads the contents of the files and asks what they do not state ([`ask::Asker`]; an option, a terminal or a default answers). It estimates
+//! start values of the parameters, and gives the texts of both files ([`Prepared`]). It writes only bags of tables, and those only on request
 //! ([`Prepared::keep`]).
 
 pub mod ask;
@@ -39,7 +39,7 @@ pub struct Prepared {
     found: Recordings,
 }
 
-/// Asks what nothing says, and looks at the recordings.
+/// Asks what the recordings do not state, and reads the recordings.
 ///
 /// # Errors
 /// A recording is not there or wrong, or an answer is missing or makes no sense.

@@ -24,7 +24,7 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// As `[columns]` says it.
+    /// Its rule in `[columns]`.
     pub fn rule(&self) -> ColumnRule {
         // With a scale the unit has to be said here: a heading's goes unheard then.
         let unit = self.unit.or(self.column.unit.filter(|_| self.scale.is_some()));
@@ -257,7 +257,7 @@ fn refuse(option: &str, given: &Option<String>, why: &str) -> Result<(), InitErr
 struct Asked<'a> {
     option: &'a str,
     words: &'a str,
-    /// What its unit may measure, the first unless a unit says otherwise.
+    /// What its unit may measure, the first unless a unit states another one.
     kinds: &'a [Kind],
     likely: &'a [&'a str],
     column: &'a Option<String>,

@@ -129,7 +129,7 @@ fn begins_moving(record: &Recording, position: Option<&str>, plan: &Plan) -> boo
     velocity.first().is_some_and(|v| v.abs() > MOVING * rms(velocity))
 }
 
-/// What an estimate is told of each recording.
+/// The data of each recording that an estimate receives.
 fn shown<'a>(plan: &Plan, records: &'a [Recording]) -> Vec<Shown<'a>> {
     let signal = |record: &'a Recording, name: &str| record.signal(name);
     let one = |record: &'a Recording| -> Option<Shown<'a>> {

@@ -34,7 +34,7 @@ fn line(out: &mut String, text: &str, comment: &str) {
     let _ = writeln!(out, "{text:<32} # {comment}");
 }
 
-/// An element between two places, with its one number.
+/// An element between two places, with its one parameter.
 fn element(out: &mut String, name: &str, kind: &str, between: [&str; 2], (key, value, unit): (&str, f64, &str)) {
     let _ = writeln!(out, "[[elements]]\nname = \"{name}\"\nkind = \"{kind}\"\nbetween = [\"{}\", \"{}\"]", between[0], between[1]);
     line(out, &format!("{key} = {}", rounded(value)), unit);

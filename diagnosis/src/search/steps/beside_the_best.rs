@@ -1,4 +1,4 @@
-//! Hypotheses screened anew beside a structure that was found.
+//! Hypotheses screened again with a structure that was found.
 
 use super::step::{Race, Step, Terms};
 use crate::candidate::{Candidate, distinct_structures, simplest_of};
@@ -53,8 +53,8 @@ impl Step for BesideTheBest {
     }
 }
 
-/// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
-/// at low speed only where the friction at speed is right.
+/// A structure with each of the most promising effects added, screened with that structure as base. An offset shows as one only where the law of the spring
+/// behind it is right, a law at low speed only where the friction at speed is right.
 fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Steps) -> Vec<Seed> {
     let problem = course.evaluator.problem;
     let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, tuning().fit.early) else { return Vec::new() };

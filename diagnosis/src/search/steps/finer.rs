@@ -7,7 +7,7 @@ use crate::race::{Course, Seed};
 use crate::search::state::State;
 use crate::tuning::tuning;
 
-/// How finely a law is resolved is no physics: that comes before another effect.
+/// The resolution of a law is no effect of its own: that comes before another effect.
 pub(crate) struct Finer;
 
 impl Step for Finer {

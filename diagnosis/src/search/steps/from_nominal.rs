@@ -8,8 +8,8 @@ use crate::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 
-/// The refit of a model that lacks something leads away from stated parameters that were right, and an effect found beside those may end in another valley, or have a
-/// richer law in its place. So the nearest are also fitted from the parameters as given.
+/// The refit of an incomplete model moves stated parameters away from right values. An effect found with those values may end in another local minimum, or
+/// a richer law may replace it. So the nearest are also fitted from the parameters as given.
 pub(crate) struct FromNominal;
 
 impl Step for FromNominal {

@@ -1,4 +1,4 @@
-//! The steps of a search: each says which structures it wants fitted, given what was found; a file each. Their order is the schedule's.
+//! The steps of a search, a file each: each names the structures to fit, given what was found. The schedule sets their order.
 
 mod beside_the_best;
 mod exchanges;

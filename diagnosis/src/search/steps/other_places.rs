@@ -57,8 +57,8 @@ fn law(state: &State) -> String {
     simplest(&state.found, state.samples()).map_or_else(String::new, |c| key_of(&c.structure.added))
 }
 
-/// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
-/// screening, or a coupled fit, may have taken one for the other.
+/// Each effect with its values at every other place where that effect may act. To first order neighbours that are firmly joined do the same, and screening,
+/// or a coupled fit, may have confused the two.
 fn elsewhere(course: &Course, best: &Candidate) -> Vec<Seed> {
     let own = course.effects_of(&best.structure, &best.fit.values);
     let mut seeds = Vec::new();

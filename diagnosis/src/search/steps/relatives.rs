@@ -7,8 +7,8 @@ use crate::physics;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 
-/// A law that wins with more parameters has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
-/// short, the first that came near may not be the one.
+/// A law that wins with more parameters must be better than its simpler relatives, whatever their screening value. Far from the noise, where fits were cut
+/// short, the first that came near may not be the right one.
 pub(crate) struct Relatives;
 
 impl Step for Relatives {
@@ -34,8 +34,8 @@ impl Step for Relatives {
     }
 }
 
-/// Simpler laws of the same family in the place of each effect of the best. Where residuals remain, also laws that are as simple, and laws that contain it:
-/// an effect of one joint is often found as its nearest simple law, beside which no other effect can be found.
+/// Simpler laws of the same family instead of each effect of the best. Where residuals remain, also laws that are as simple, and laws that contain it. An
+/// effect of one joint is often found as its nearest simple law, and no other effect can be found while that law is in the structure.
 fn relatives(course: &Course, found: &[Candidate], done: bool) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
     let own = course.effects_of(&best.structure, &best.fit.values);

@@ -8,7 +8,7 @@ use crate::search::state::State;
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
-/// A law beside a stated parameter of its kind in the neighbourhood, which starts where that has given back what it may have absorbed.
+/// A law next to a stated parameter of its kind in the neighbourhood. Its start re-initialises that parameter, which may have absorbed the effect.
 pub(crate) struct RestoredDefaults;
 
 impl Step for RestoredDefaults {
@@ -33,9 +33,9 @@ impl Step for RestoredDefaults {
     }
 }
 
-/// Laws of one number that promise something, beside a stated number of the same kind that has a body in common with them and that gives back what it
-/// may have taken on. A damper at a motor and one at the drum behind a stiff cable do nearly the same: a fit goes from all at one to all at the other along
-/// a narrow valley, and not to its end. `chance` is the share that the best promises by chance.
+/// Laws of one parameter with a good screening value, next to a stated parameter of the same kind that has a body in common with them. That parameter is
+/// re-initialised, because it may have absorbed the effect. A damper at a motor and one at the drum behind a stiff cable do nearly the same. A fit goes
+/// from all at one to all at the other along a narrow valley, and not to its end. `chance` is the share that the best promises by chance.
 fn given_back(course: &Course, promises: &[Promise], chance: f64) -> Vec<Seed> {
     let problem = course.evaluator.problem;
     let top = promises.first().map_or(0.0, |p| p.share);

@@ -1,4 +1,4 @@
-//! A law of many parameters in the place of the best.
+//! A law of many parameters that replaces the best.
 
 use super::step::Step;
 use crate::candidate::distinct_structures;

@@ -9,9 +9,9 @@ use crate::search::state::State;
 use crate::structure::Structure;
 use crate::tuning::tuning;
 
-/// A play of another size meets its sides at other times, so that the misfit of a simulation says little of how far off a size is, and the refit of a model without it has
-/// moved stiffnesses and inertias far away. So sizes all over the range are tried, beside the stated parameters as given and as fitted, firmly coupled to the measured
-/// motion; the best are fitted there.
+/// A backlash of another size meets its sides at other times, so the misfit of a simulation does not show how far off a size is. The refit of a model
+/// without backlash has also moved stiffnesses and inertias far away. So sizes all over the range are tried, with the stated parameters as given and as
+/// fitted, firmly coupled to the measured motion. The best are fitted there.
 pub(crate) struct Scans;
 
 impl Step for Scans {

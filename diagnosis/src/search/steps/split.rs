@@ -1,4 +1,4 @@
-//! Joints with a body in them, from where the model has given back what it absorbed of it.
+//! Joints with a body in them, started after the model's parameters that absorbed the body are re-initialised.
 
 use super::near::brought_near;
 use super::step::{Step, Terms};
@@ -11,8 +11,9 @@ use crate::search::state::State;
 use crate::structure::Structure;
 use crate::tuning::tuning;
 
-/// A compliance in series with a body behind it does nothing to first order that a softer joint and heavier ends do not do, so screening sees little of it, and a fit
-/// from beside what these absorbed goes back to them. Each joint is split, and starts from several frequencies of the body in it.
+/// To first order, a compliance in series with a body behind it has the same effect as a softer joint and heavier ends. So screening detects little of it.
+/// A fit that starts near the parameters that absorbed the body returns to them. So each joint is split, and the fits start from several frequencies of the
+/// body in it.
 pub(crate) struct Split {
     name: &'static str,
     /// Whether beside the best effects that were found, else beside the nominal model alone.

@@ -1,4 +1,4 @@
-//! What a step of a search says of itself.
+//! The properties that a step of a search declares.
 
 use crate::race::Seed;
 use crate::search::state::State;

@@ -1,4 +1,4 @@
-//! What a verdict says of an arm alone.
+//! The part of a verdict that only arms have.
 
 use super::finding::Interval;
 use super::shown::Where;

@@ -1,4 +1,4 @@
-//! The verdict file as a value: what a diagnosis says, in SI units. Reading takes files of earlier versions, which lack newer keys.
+//! The verdict file as a value: the result of a diagnosis, in SI units. Reading takes files of earlier versions, which lack newer keys.
 
 mod arm;
 mod finding;

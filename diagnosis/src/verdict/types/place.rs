@@ -4,7 +4,7 @@ use crate::hypothesis::Place;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where a physics acts.
+/// Where an effect acts.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(remote = "Place", rename_all = "snake_case")]
 #[allow(dead_code)] // its variants are only read and written

@@ -1,4 +1,4 @@
-//! What a verdict says of joints that position servos drive.
+//! The part of a verdict on joints that position servos drive.
 
 use super::finding::Estimate;
 use schemars::JsonSchema;

@@ -31,7 +31,7 @@ fn a_file_of_an_earlier_version_is_read() {
     assert_eq!(finding.parameters["stiffness"], Parameter::List(list));
     assert_eq!(read.parameters["elements.cable.stiffness"].moved_sd, None);
     assert_eq!(read.shows.as_ref().unwrap().class, None);
-    // What is written of it says the same.
+    // Its written text gives the same verdict.
     assert_eq!(serde_json::from_str::<Verdict>(&serde_json::to_string(&read).unwrap()).unwrap(), read);
 }
 
