@@ -82,8 +82,8 @@ fn elsewhere(course: &Course, best: &Candidate) -> Vec<Seed> {
     seeds
 }
 
-/// Friction of one body shared with a body that an element joins to it, half of the force at each: below their resonance both together do what one does, so that
-/// friction of two bodies is found as that of one at first.
+/// Friction of one body shared with a body that an element joins to it, half of the force at each. Below their resonance both together do what one does, so
+/// that friction of two bodies is first found as friction of one.
 fn shared(course: &Course, best: &Candidate) -> Vec<Seed> {
     let problem = course.evaluator.problem;
     let own = course.effects_of(&best.structure, &best.fit.values);
