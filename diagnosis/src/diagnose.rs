@@ -1,16 +1,17 @@
 //! A diagnosis from its problem to its verdict: the audit, the search, the force located, what is claimed, and each record by itself.
 
 use crate::audit::{Remark, Weight, audit, without_contradicted};
-use crate::candidate::{Candidate, price};
+use crate::candidate::price;
 use crate::compare::unseen;
 use crate::contenders::with_contenders;
-use crate::equation_error::{OnForces, inverse, search_on_forces};
+use crate::equation_error::{OnForces, inverse, search_on_forces, with_model};
 use crate::hold;
 use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
 use crate::released_parameters::hold_with_released_parameters;
 use crate::search::{Search, SearchError, Settings, search};
+use crate::structure::Structure;
 use crate::thinned::thinned;
 use crate::tuning::tuning;
 use crate::verdict::{Files, Verdict, VerdictError, chosen, timing, verdict, without_what_may_be_nothing};
@@ -81,8 +82,8 @@ pub fn diagnose(
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
 
-/// Searches on forces where they are known along the motion, else by simulation. Where the laws on forces leave much, the set is simulated as well; of a device that
-/// forces drive, forces are asked where simulation names no law.
+/// Searches on forces where they are known along the motion, else by simulation. Where the laws on forces leave much, the set is simulated as well. Of a device that
+/// forces drive, forces are asked where the simulation does not reach the sensor noise.
 fn searched(
     problem: Problem,
     settings: &Settings,
@@ -100,13 +101,12 @@ fn searched(
     let simulated = by_simulation(problem, settings, limit, report, &mut of_simulation)?;
     let best = chosen(&simulated.1);
     let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
-    let on_forces = match direct {
-        Some(found) => Some(found).filter(|found| !leaves_less(&simulated, found)),
-        None => {
-            turned.filter(|_| !is_explained && best.structure.added.is_empty()).and_then(|t| search_on_forces(&t, settings, limit, report))
-        }
+    let on_forces = match (direct, turned) {
+        (Some(found), _) => Some(found),
+        (None, Some(turned)) if !is_explained => search_on_forces(&turned, settings, limit, report),
+        (None, _) => None,
     };
-    match on_forces {
+    match on_forces.filter(|found| !leaves_less(&simulated, found)) {
         Some(found) => Ok(found),
         None => {
             remarks.extend(of_simulation);
@@ -119,10 +119,21 @@ fn searched(
 /// it a motion's steps and noise, differentiated twice, count as noise of the force and hide what either leaves.
 fn leaves_less(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
     let (problem, found) = on_forces;
-    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
-    let left = |c: &Candidate| Some(unseen(problem, records, &c.structure, &c.fit.values, &found.noise_sd)?.mean_square.sqrt());
-    left(chosen(&simulated.1))
-        .zip(left(chosen(found)))
+    let left = |problem: &Problem, structure: &Structure, values: &[f64]| {
+        let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
+        Some(unseen(problem, records, structure, values, &found.noise_sd)?.mean_square.sqrt())
+    };
+    let (own, best) = (chosen(found), chosen(&simulated.1));
+    let simulated = match problem.inverse {
+        None => left(problem, &best.structure, &best.fit.values),
+        // A model that was fitted as driven by forces: moved along the motion, as it stands.
+        Some(_) => best.structure.model(&simulated.0, &best.fit.values).and_then(|model| {
+            let moved = with_model(problem, &model)?;
+            left(&moved, &Structure::new(&moved, &moved.fit, Vec::new()), &[])
+        }),
+    };
+    simulated
+        .zip(left(problem, &own.structure, &own.fit.values))
         .is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
 }
 

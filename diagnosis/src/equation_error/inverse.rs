@@ -34,10 +34,20 @@ pub(crate) fn inverse(problem: &Problem) -> Option<Problem> {
     }
     let (output, force) = (position(model)?, model.inputs.first()?);
     let motion = model.outputs.get(output)?;
-    let turned = Model {
-        inputs: vec![Input::ideal(&motion.name, InputKind::Motion, 0, Hold::Cubic)],
+    let turned = turned_model(model, &motion.name, &force.name);
+    let of = |records: &[Record]| records.iter().map(|record| turned_record(model, output, record)).collect::<Option<Vec<Record>>>();
+    let (fit, held_out) = (of(&problem.fit)?, of(&problem.held_out)?);
+    let inverse = Inverse { recorded: Arc::new(problem.clone()), motion: motion.name.clone(), force: force.name.clone() };
+    let problem = Problem::new(problem.text.clone(), problem.model_path.clone(), turned, fit, held_out, Initial::Rest).ok()?;
+    Some(Problem { inverse: Some(inverse), ..problem })
+}
+
+/// The model moved along the motion, with the force that this takes as its only output.
+fn turned_model(model: &Model, motion: &str, force: &str) -> Model {
+    Model {
+        inputs: vec![Input::ideal(motion, InputKind::Motion, 0, Hold::Cubic)],
         outputs: vec![Output {
-            name: force.name.clone(),
+            name: force.to_string(),
             kind: OutputKind::Reaction(0),
             gain: 1.0,
             delay: 0.0,
@@ -47,12 +57,13 @@ pub(crate) fn inverse(problem: &Problem) -> Option<Problem> {
         }],
         axes: Vec::new(),
         ..model.clone()
-    };
-    let of = |records: &[Record]| records.iter().map(|record| turned_record(model, output, record)).collect::<Option<Vec<Record>>>();
-    let (fit, held_out) = (of(&problem.fit)?, of(&problem.held_out)?);
-    let inverse = Inverse { recorded: Arc::new(problem.clone()), motion: motion.name.clone(), force: force.name.clone() };
-    let problem = Problem::new(problem.text.clone(), problem.model_path.clone(), turned, fit, held_out, Initial::Rest).ok()?;
-    Some(Problem { inverse: Some(inverse), ..problem })
+    }
+}
+
+/// The turned problem with bodies and elements of another model of the same device, such as one that a simulation was fitted with.
+pub(crate) fn with_model(turned: &Problem, model: &Model) -> Option<Problem> {
+    let inverse = turned.inverse.as_ref()?;
+    Some(Problem { model: turned_model(model, &inverse.motion, &inverse.force), stated: Vec::new(), ..turned.clone() })
 }
 
 /// The output that is the body's position, delayed by nothing.

@@ -14,7 +14,7 @@ mod search;
 
 use band::{corners, is_known};
 pub use belief::{Belief, Figures};
-pub(crate) use inverse::inverse;
+pub(crate) use inverse::{inverse, with_model};
 pub use on_forces::OnForces;
 pub(crate) use search::search_on_forces;
 
