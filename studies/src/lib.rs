@@ -17,6 +17,7 @@ mod dfki_double_pendulum;
 mod emps;
 mod engine_bench;
 mod kuka_kr300;
+mod machines;
 mod odrive_cogging;
 mod papers;
 mod piezo_p885;
@@ -38,6 +39,7 @@ pub const STUDIES: &[&Study] = &[
     &dfki_double_pendulum::STUDY,
     &emps::STUDY,
     &kuka_kr300::STUDY,
+    &machines::STUDY,
     &odrive_cogging::STUDY,
     &piezo_p885::STUDY,
     &silverbox::STUDY,
