@@ -116,7 +116,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             "simulated in closed loop the model needs {:.0} % more correction with {} {} than without it: it is not asserted",
             100.0 * (ratio - 1.0),
             term.physics.facts().words,
-            backdrive_diagnosis::words::place(&place(&data, term))
+            backdrive_diagnosis::verdict::words::place(&place(&data, term))
         ));
     }
     if data.most_tolerance == 0 {

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::regression::Data;
 use crate::search::{Search, added};
 use crate::verdict::{ALIKE, place};
-use backdrive_diagnosis::words as said;
+use backdrive_diagnosis::verdict::words as said;
 use backdrive_plant::robot::Payload;
 use nalgebra::Vector3;
 

@@ -7,7 +7,7 @@ use crate::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
 use crate::remaining_residual::{Left, left};
-use backdrive_diagnosis::predictive::{Gain, gain};
+use backdrive_diagnosis::belief::predictive::{Gain, gain};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Effects that are added at most, without those that every joint has.

@@ -46,7 +46,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
         false => findings.iter().filter(|f| !against(f)).collect(),
     };
     let named: Vec<String> =
-        asserted.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
+        asserted.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::verdict::words::place(&f.place))).collect();
     let unseen = if held { "held-out" } else { "fitted" };
     let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
@@ -63,7 +63,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
             let named = named.join(", ");
             let open = match other {
                 Some(a) => {
-                    let other = format!("{} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place));
+                    let other = format!("{} {}", words(&a.physics), backdrive_diagnosis::verdict::words::place(&a.place));
                     format!("leaves out {named}, or in place of the first {other}, which these logs do not tell apart")
                 }
                 None => format!("may leave out {named}, which held-out torque or a simulation in closed loop does not bear out"),

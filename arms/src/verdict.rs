@@ -11,8 +11,8 @@ use crate::remaining_residual::{Left, left};
 use crate::search::{LEAST_SHARE, Rival, Search, added, by_block};
 use crate::sentences::{remaining, sentence};
 use crate::written::gravity_of;
+use backdrive_diagnosis::belief::predictive::gain;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::predictive::gain;
 use backdrive_diagnosis::verdict::{
     Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors,
     Remark, SCHEMA, Searched, Verdict, Word,

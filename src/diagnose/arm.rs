@@ -12,8 +12,8 @@ use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, Tried, diagnose
 use backdrive_arms::problem::Problem;
 use backdrive_arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::verdict::words as said;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Verdict, Word};
-use backdrive_diagnosis::words as said;
 use backdrive_pages::diagnose::arm::{Shown, page};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::JointKind;

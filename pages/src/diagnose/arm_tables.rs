@@ -7,8 +7,8 @@ use backdrive_arms::judge::AGAINST;
 use backdrive_arms::problem::Problem;
 use backdrive_arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::verdict::words as said;
 use backdrive_diagnosis::verdict::{Interval, Verdict};
-use backdrive_diagnosis::words as said;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 
 /// Rows of what was tried that are shown at once.
