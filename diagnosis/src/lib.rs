@@ -7,6 +7,7 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod arms;
 pub mod audit;
 pub mod belief;
 pub mod diagnose;
