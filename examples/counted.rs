@@ -5,10 +5,10 @@
 //! Takes the name of a counter, and how often its unit is done. A new one is a line in `COUNTERS` and a table in benches/counts.toml.
 
 use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo, WhenFull};
-use backdrive_diagnosis::effort::Effort;
-use backdrive_diagnosis::evaluator::Evaluator;
-use backdrive_diagnosis::problem::{Problem, Record};
-use backdrive_diagnosis::structure::Structure;
+use backdrive_diagnosis::output_error::effort::Effort;
+use backdrive_diagnosis::output_error::evaluator::Evaluator;
+use backdrive_diagnosis::output_error::structure::Structure;
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;

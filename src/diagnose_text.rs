@@ -1,11 +1,11 @@
 //! What `backdrive diagnose` prints: a dozen lines for a person, from the same data as the verdict file.
 
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::belief::intervals::Uncertainty;
+use backdrive_diagnosis::belief::parameters::rows;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::intervals::Uncertainty;
-use backdrive_diagnosis::parameters::rows;
+use backdrive_diagnosis::verdict::words;
 use backdrive_diagnosis::verdict::{Finding, HeldOut, Remaining};
-use backdrive_diagnosis::words;
 use backdrive_pages::diagnose::sentences::{alternatives, confidence, errors, next_experiment, parameters, shows};
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
@@ -79,7 +79,7 @@ fn recordings(found: &Diagnosis) -> String {
         .enumerate()
         .filter(|(index, _)| measured(*index))
         .map(|(_, (output, floor))| {
-            format!("{} {}", output.name, si(*floor, &backdrive_diagnosis::parameters::unit_of_output(problem, &output.kind)))
+            format!("{} {}", output.name, si(*floor, &backdrive_diagnosis::belief::parameters::unit_of_output(problem, &output.kind)))
         })
         .collect();
     format!(

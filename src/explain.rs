@@ -1,7 +1,7 @@
 //! What a search tried, what it cost and why it lost, as tables to follow.
 
+use backdrive_diagnosis::belief::beaten::{Beaten, beaten};
 use backdrive_diagnosis::search::{Outcome, Search};
-use backdrive_diagnosis::verdict::{Beaten, beaten};
 use std::fmt::Write as _;
 
 /// Structures that are shown, at most.

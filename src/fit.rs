@@ -11,15 +11,15 @@ use crate::output;
 use crate::progress;
 use crate::servo_runs;
 use backdrive_diagnosis::audit::without_contradicted;
-use backdrive_diagnosis::compare::{Quality, predictions, qualities};
-use backdrive_diagnosis::intervals::Uncertainty;
-use backdrive_diagnosis::parameters::{Pair, Row, correlated, refitted_text, rows};
-use backdrive_diagnosis::per_record::{PerRecord, fit_each};
+use backdrive_diagnosis::belief::compare::{Quality, predictions, qualities};
+use backdrive_diagnosis::belief::intervals::Uncertainty;
+use backdrive_diagnosis::belief::parameters::{Pair, Row, correlated, refitted_text, rows};
+use backdrive_diagnosis::belief::per_record::{PerRecord, fit_each};
+use backdrive_diagnosis::output_error::structure::{FreeParameter, Role, Structure};
+use backdrive_diagnosis::output_error::work::{Budget, Limit};
 use backdrive_diagnosis::physics::PHYSICS;
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
-use backdrive_diagnosis::structure::{FreeParameter, Role, Structure};
-use backdrive_diagnosis::work::{Budget, Limit};
 use backdrive_pages::parts::file_name;
 use backdrive_plant::model::Model;
 use backdrive_report::{number, percent};
@@ -261,7 +261,7 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
                 false => "–".to_string(),
             }));
             let enough = across.own.iter().filter(|o| o.determined).count() > 1;
-            row.push(if enough { backdrive_diagnosis::words::share(across.p_value) } else { "–".to_string() });
+            row.push(if enough { backdrive_diagnosis::verdict::words::share(across.p_value) } else { "–".to_string() });
             table.push(row);
         }
         out.push_str(&columns(&table));

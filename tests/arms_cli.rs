@@ -1,7 +1,7 @@
 //! `backdrive diagnose` on a two-joint arm whose logs are made here. What is found is reported in text, verdict and page, from tables and from bags alike;
 //! what nothing explains is called so. Options without meaning and wrong input are reported in one sentence.
 
-#[path = "../arms/tests/common/mod.rs"]
+#[path = "../diagnosis/tests/arms/common/mod.rs"]
 mod logs;
 mod system;
 

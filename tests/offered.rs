@@ -3,7 +3,7 @@
 //! The commands are collected from what the verbs print and write, and each is run as it stands, in its order, in the same folder. Of commands that
 //! search for minutes (`diagnose` with more effort) the effort is reduced before they are run: what they name is checked nevertheless.
 
-#[path = "../arms/tests/common/mod.rs"]
+#[path = "../diagnosis/tests/arms/common/mod.rs"]
 mod arms;
 mod system;
 

@@ -3,9 +3,9 @@
 //! `--tuning claim.alike=4` or `--tuning claim.alike=x2` changes an entry of the tuning table, to see how much verdicts depend on it;
 //! `diagnose --list-tuning` lists them.
 
-use backdrive_diagnosis::candidate::advantage_over;
 use backdrive_diagnosis::diagnose::diagnose;
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::output_error::candidate::advantage_over;
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::tuning::Tuning;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, rival_file};
@@ -81,8 +81,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let list: Vec<String> = figures.list().iter().map(|x| format!("{x:.4}")).collect();
             eprintln!("figures\t{physics}\t{place}\t{}", list.join("\t"));
         }
-        let held = |c: &backdrive_diagnosis::candidate::Candidate| {
-            let (n, b) = (nominal.unseen.as_ref(), backdrive_diagnosis::verdict::chosen(found).unseen.as_ref());
+        let held = |c: &backdrive_diagnosis::output_error::candidate::Candidate| {
+            let (n, b) = (nominal.unseen.as_ref(), backdrive_diagnosis::belief::choice::chosen(found).unseen.as_ref());
             c.unseen.as_ref().map(|u| (u.mean_square.sqrt(), n.and_then(|n| n.gain_over(u)), b.and_then(|b| u.gain_over(b))))
         };
         eprintln!("unseen nominal {:.3?}", held(nominal));

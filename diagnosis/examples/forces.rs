@@ -2,7 +2,7 @@
 //! law that is claimed and its figures. `cargo run --release --example forces -- SET.toml...`; `tests/concealed/calibrate_forces.py` reads it.
 
 use backdrive_diagnosis::equation_error::figures_of;
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::recordings::problem::Problem;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,10 +2,10 @@
 //! finer steps than the diagnosis takes. They are measured with noise and encoders. The diagnosis receives their models with parameters that are off in
 //! half of the cases.
 
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::output_error::work::Limit;
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::verdict::verdict;
-use backdrive_diagnosis::work::Limit;
 use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;

@@ -5,14 +5,14 @@
 //! and needs no quadratic cost. One row per parameter: set, structure, parameter, its value, both ends of either interval in the fit's own unit, and the
 //! ratio of their widths. At the end the quantiles of the ratios.
 
-use backdrive_diagnosis::candidate::Candidate;
-use backdrive_diagnosis::evaluator::Evaluator;
-use backdrive_diagnosis::intervals::Uncertainty;
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::belief::choice::chosen;
+use backdrive_diagnosis::belief::intervals::Uncertainty;
+use backdrive_diagnosis::output_error::candidate::Candidate;
+use backdrive_diagnosis::output_error::evaluator::Evaluator;
+use backdrive_diagnosis::output_error::work::Limit;
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::tuning::tuning;
-use backdrive_diagnosis::verdict::chosen;
-use backdrive_diagnosis::work::Limit;
 use std::path::Path;
 
 /// 95 % quantile of a chi-square of one degree of freedom.

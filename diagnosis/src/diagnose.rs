@@ -1,21 +1,23 @@
 //! A diagnosis from its problem to its verdict: the audit, the search, the force located, what is claimed, and each record by itself.
 
 use crate::audit::{Remark, Weight, audit, without_contradicted};
-use crate::candidate::price;
-use crate::compare::unseen;
-use crate::contenders::with_contenders;
+use crate::belief::choice::chosen;
+use crate::belief::compare::unseen;
+use crate::belief::contenders::with_contenders;
+use crate::belief::decision::without_what_may_be_nothing;
+use crate::belief::per_record::{PerRecord, fit_each};
+use crate::belief::released_parameters::hold_with_released_parameters;
 use crate::equation_error::{OnForces, inverse, search_on_forces, with_model};
-use crate::hold;
 use crate::locate::{self, Location, locate};
-use crate::per_record::{PerRecord, fit_each};
-use crate::problem::Problem;
-use crate::released_parameters::hold_with_released_parameters;
+use crate::output_error::candidate::price;
+use crate::output_error::hold;
+use crate::output_error::structure::Structure;
+use crate::output_error::work::{Budget, Limit};
+use crate::recordings::problem::Problem;
+use crate::recordings::thinned::thinned;
 use crate::search::{Search, SearchError, Settings, search};
-use crate::structure::Structure;
-use crate::thinned::thinned;
 use crate::tuning::tuning;
-use crate::verdict::{Files, Verdict, VerdictError, chosen, timing, verdict, without_what_may_be_nothing};
-use crate::work::{Budget, Limit};
+use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
 use std::sync::atomic::AtomicBool;
 
 /// Everything that was found.

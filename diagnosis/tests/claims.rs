@@ -2,12 +2,12 @@
 //! more remains.
 
 use backdrive_diagnosis::diagnose::diagnose;
-use backdrive_diagnosis::error_budget::Source;
-use backdrive_diagnosis::hold;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::output_error::error_budget::Source;
+use backdrive_diagnosis::output_error::hold;
+use backdrive_diagnosis::output_error::work::Limit;
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Verdict, Word, timing, verdict};
-use backdrive_diagnosis::work::Limit;
 use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::Recording;

@@ -1,7 +1,7 @@
 //! Motion and force both recorded: laws are named from the forces along the motion, also where the motion is known to a step and the drive rests.
 
 use backdrive_diagnosis::diagnose::diagnose;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{Parameter, Verdict, Word};
 use backdrive_plant::model::Model;

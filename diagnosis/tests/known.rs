@@ -1,15 +1,15 @@
 //! Devices with known effects: a missing one is named, and nothing is named where nothing is missing.
 
-use backdrive_diagnosis::compare::unseen;
-use backdrive_diagnosis::evaluator::Evaluator;
+use backdrive_diagnosis::belief::compare::unseen;
+use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::intervals::Uncertainty;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::output_error::evaluator::Evaluator;
+use backdrive_diagnosis::output_error::structure::Structure;
+use backdrive_diagnosis::output_error::work::Limit;
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
-use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::{Files, Finding, Parameter, Verdict, Word, verdict};
-use backdrive_diagnosis::work::Limit;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::{Condition, Initial};
@@ -99,7 +99,7 @@ fn refitted_numbers_lie_in_their_intervals() {
     let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[], &[]), tuning().fit.to_the_end).unwrap();
     let level = (fit.cost / fit.residuals.len() as f64).sqrt();
     assert!(level < 1.1, "{level} floors");
-    let candidate = backdrive_diagnosis::candidate::Candidate {
+    let candidate = backdrive_diagnosis::output_error::candidate::Candidate {
         structure,
         fit,
         correlation_time: 1.0,

@@ -5,12 +5,12 @@
 mod skipped;
 
 use backdrive_diagnosis::audit;
-use backdrive_diagnosis::compare::mean_squares;
+use backdrive_diagnosis::belief::compare::mean_squares;
 use backdrive_diagnosis::diagnose::{Diagnosis, diagnose};
 use backdrive_diagnosis::hypothesis::Family;
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::output_error::structure::Structure;
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::search::Settings;
-use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::Parameter;
 use std::path::{Path, PathBuf};
 

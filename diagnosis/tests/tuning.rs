@@ -1,6 +1,6 @@
 //! The tuning table: its page, and its evidence.
 
-use backdrive_diagnosis::document::tuning_page;
+use backdrive_diagnosis::tuning::document::tuning_page;
 use backdrive_diagnosis::tuning::{Evidence, Tuning, tuning};
 use std::collections::HashSet;
 

@@ -42,7 +42,7 @@ pub use report::{ClockReport, Report, SignalReport};
 pub use response::{Bandwidth, Interval, Response};
 pub use source::{InspectError, Options, Source};
 
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::noise;
 use joints::Joint;
 
 /// Inspects recordings: each by itself, and the zeros of their joints beside each other.

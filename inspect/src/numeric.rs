@@ -1,6 +1,6 @@
 //! Statistics of plain slices: quantiles, ranges, runs.
 
-use backdrive_diagnosis::statistics::deviation_by_median;
+use backdrive_diagnosis::belief::statistics::deviation_by_median;
 pub use backdrive_signal::statistics::{deviation, mean};
 
 /// The value below which this share of the finite values lies; 0 of none.

@@ -10,7 +10,7 @@ use backdrive_bags::{
     ImportOptions, LerobotOptions, RawColumn, RawRecording, RawStream, Reader, TableFormat, is_lerobot, is_rosbag, raw_bag, raw_lerobot,
     raw_table, shell_word,
 };
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::noise;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{resample, units};
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use crate::numeric::{span, thinned};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
-use backdrive_diagnosis::follow::follow;
+use backdrive_diagnosis::recordings::follow::follow;
 use backdrive_signal::derivative;
 
 /// Share of variance from which on data alone say what a signal is.

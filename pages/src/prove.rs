@@ -3,7 +3,7 @@
 use crate::parts::ending;
 use backdrive_bags::shell_word;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::words;
+use backdrive_diagnosis::verdict::words;
 use backdrive_prove::Options;
 use backdrive_prove::case::{Case, SHOWS};
 use backdrive_prove::gain::{ESTIMATED, Hand};

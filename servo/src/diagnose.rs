@@ -12,7 +12,7 @@ use crate::shared::shared;
 use crate::simulate::simulate;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::noise;
 use backdrive_diagnosis::verdict::{
     Alternative, Estimate, Finding, HeldOut, MODEL_FILE, Parameter, RecordErrors, Remark, SCHEMA, ServoAnswer, ServoErrors, ServoPart,
     Verdict, Word,

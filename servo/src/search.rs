@@ -3,7 +3,7 @@
 use crate::fit::{BLOCKS, Fit, Problem};
 use crate::physics::{ALL, BASE, Physics, Sizes, named};
 use crate::record::Record;
-use backdrive_diagnosis::predictive::{Gain, gain};
+use backdrive_diagnosis::belief::predictive::{Gain, gain};
 use backdrive_plant::servo::{Number, Numbers};
 use backdrive_signal::statistics::{deviation, rms};
 use rayon::prelude::*;

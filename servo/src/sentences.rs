@@ -5,7 +5,7 @@ use backdrive_diagnosis::verdict::{Finding, ServoPart, Word};
 
 /// An effect in words.
 pub fn words(physics: &str) -> String {
-    named(physics).map_or_else(|| backdrive_diagnosis::words::physics(physics), |p| p.words.to_string())
+    named(physics).map_or_else(|| backdrive_diagnosis::verdict::words::physics(physics), |p| p.words.to_string())
 }
 
 /// The joint of a finding.

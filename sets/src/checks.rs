@@ -2,7 +2,7 @@
 
 use crate::error::SetError;
 use backdrive_bags::Reader;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Source, read_headings, signals_of, units};
 use backdrive_plant::set::RecordingSet;

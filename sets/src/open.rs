@@ -4,7 +4,7 @@ use crate::checks;
 use crate::error::SetError;
 use backdrive_bags::{Account, Reader, import_command, recover_command};
 use backdrive_diagnosis::audit;
-use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
+use backdrive_diagnosis::recordings::problem::{MOST_OF_A_BAG, Problem, ProblemError};
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::recording::RecordingError;
 use backdrive_plant::set::RecordingSet;

@@ -1,7 +1,7 @@
 //! Options of `backdrive diagnose`.
 
 use super::values::positive;
-use backdrive_arms::physics::ALL as OF_ARMS;
+use backdrive_diagnosis::arms::physics::ALL as OF_ARMS;
 use backdrive_diagnosis::physics::{PHYSICS, physics_named};
 use backdrive_servo::physics::ALL as OF_SERVOS;
 use clap::Args;

@@ -2,7 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
-use backdrive_arms::physics::ALL;
+use backdrive_diagnosis::arms::physics::ALL;
 use backdrive_plant::set::{Initial, RecordingSet};
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! What leaving something out costs: the error on recordings with it and without.
 
 use crate::failure::Failure;
-use backdrive_diagnosis::compare::{predictions, qualities};
-use backdrive_diagnosis::problem::{Problem, Record};
-use backdrive_diagnosis::structure::Structure;
+use backdrive_diagnosis::belief::compare::{predictions, qualities};
+use backdrive_diagnosis::output_error::structure::Structure;
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_export::{Change, LeftOut, change_all};
 use backdrive_plant::model::Model;
 use backdrive_sets::open;

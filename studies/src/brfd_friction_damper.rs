@@ -3,9 +3,9 @@
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, refit, refitted, said, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::evaluator::Evaluator;
-use backdrive_diagnosis::problem::Problem;
-use backdrive_diagnosis::structure::{Role, Structure};
+use backdrive_diagnosis::output_error::evaluator::Evaluator;
+use backdrive_diagnosis::output_error::structure::{Role, Structure};
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::MODEL_FILE;
 use backdrive_plant::model::Model;

@@ -6,7 +6,7 @@
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, read, said, total, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict};
 use backdrive_signal::derivative;
 use backdrive_signal::low_pass::LowPass;

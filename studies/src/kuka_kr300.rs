@@ -4,10 +4,10 @@
 use crate::run::{Ask, diagnose, findings, parameter, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::compare::{predictions, qualities};
+use backdrive_diagnosis::belief::choice::chosen;
+use backdrive_diagnosis::belief::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::structure::Structure;
-use backdrive_diagnosis::verdict::chosen;
+use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_signal::low_pass::LowPass;
 
 pub(crate) const STUDY: Study = Study {

@@ -5,10 +5,11 @@
 use crate::run::{Ask, diagnose, said, solved, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::compare::predictions;
+use backdrive_diagnosis::belief::choice::chosen;
+use backdrive_diagnosis::belief::compare::predictions;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::problem::Record;
-use backdrive_diagnosis::verdict::{Finding, Parameter, chosen};
+use backdrive_diagnosis::recordings::problem::Record;
+use backdrive_diagnosis::verdict::{Finding, Parameter};
 use backdrive_signal::derivative;
 use backdrive_signal::low_pass::LowPass;
 use backdrive_signal::statistics::{deviation, rms};

@@ -3,12 +3,12 @@
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
 use backdrive_diagnosis::audit::{Remark, audit};
-use backdrive_diagnosis::compare::{predictions, qualities};
+use backdrive_diagnosis::belief::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::physics::PHYSICS;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::Settings;
-use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
 use backdrive_sets::open;

@@ -1,8 +1,8 @@
 //! What a master does that its model does not: a diagnosis of the recorded loop, with the force on the motor and the hand as what was put in.
 
-use backdrive_diagnosis::candidate::{Candidate, price};
 use backdrive_diagnosis::hypothesis::{Family, Place};
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::output_error::candidate::{Candidate, price};
+use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings as NodeSettings};
 use backdrive_plant::model::Model;

@@ -14,7 +14,7 @@ pub use remark::{Remark, Weight};
 pub use signals::limits_reached;
 pub use velocities::without_contradicted;
 
-use crate::problem::{Problem, Record};
+use crate::recordings::problem::{Problem, Record};
 use backdrive_plant::model::InputKind;
 use backdrive_plant::set::Initial;
 use remark::merged;

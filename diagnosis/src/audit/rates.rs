@@ -2,9 +2,9 @@
 
 use super::remark::file_name;
 use super::units::factor;
-use crate::evaluator::measured;
-use crate::problem::{Problem, Record};
-use crate::simulate::predict;
+use crate::output_error::evaluator::measured;
+use crate::output_error::simulate::predict;
+use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::stepper::segments;
 

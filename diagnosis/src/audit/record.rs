@@ -2,7 +2,7 @@
 
 use super::remark::{Remark, Weight, add};
 use super::signals::{clipped_share, is_constant, off_grid, quiet_top};
-use crate::problem::{Problem, Record};
+use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, OutputKind};
 
@@ -23,7 +23,7 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
             continue;
         }
         constant(record, &input.name, samples, all);
-        if let (InputKind::Motion, Some(step)) = (input.kind, crate::noise::step_of(samples)) {
+        if let (InputKind::Motion, Some(step)) = (input.kind, crate::recordings::noise::step_of(samples)) {
             let text = format!(
                 "drives the model and moves in steps of {step:.4e}: differentiated twice, each is an acceleration of {:.1e} for a sample; what that does to \
                  the forces counts as noise of theirs",
@@ -106,7 +106,7 @@ fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Ve
 }
 
 fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut Vec<Remark>) {
-    match crate::noise::step_of(samples) {
+    match crate::recordings::noise::step_of(samples) {
         Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > tuning().recordings.grid => {
             let text = format!("moves in steps of {step:.4e}, the model says {stated:.4e}");
             add(all, Weight::Caution, record, name, "encoder", text);

@@ -1,6 +1,6 @@
 //! The content of a check's remark, and the recordings and the signal it refers to.
 
-use crate::problem::Record;
+use crate::recordings::problem::Record;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

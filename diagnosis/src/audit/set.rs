@@ -2,8 +2,8 @@
 
 use super::remark::{Remark, Weight, add, file_name};
 use super::signals::answers;
-use crate::problem::Problem;
-use crate::repeatability::{self, Repeat};
+use crate::recordings::problem::Problem;
+use crate::recordings::repeatability::{self, Repeat};
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, OutputKind};
 

@@ -31,7 +31,7 @@ pub fn limits_reached(samples: &[f64]) -> Vec<(f64, f64)> {
         return Vec::new();
     }
     let (low, high) = extremes(samples);
-    let band = (1e-4 * (high - low)).max(crate::noise::step_of(samples).unwrap_or(0.0));
+    let band = (1e-4 * (high - low)).max(crate::recordings::noise::step_of(samples).unwrap_or(0.0));
     let within = |level: f64, from: f64, to: f64| samples.iter().filter(|s| (from..to).contains(&((**s - level).abs() / band))).count();
     let is_limit = |level: f64| {
         let (at, beside) = (within(level, 0.0, 0.5), within(level, 0.5, 1.5));

@@ -1,8 +1,8 @@
 //! Units and signs: the measured signals compared with the predictions of the nominal model, as given.
 
 use super::remark::{Remark, Weight, file_name};
-use crate::problem::Problem;
-use crate::simulate::predict;
+use crate::output_error::simulate::predict;
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
 use backdrive_plant::model::{Motion, OutputKind};
 
@@ -28,7 +28,7 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
         let mut of_records = Vec::new();
         for (record, predicted) in problem.fit.iter().zip(&predicted) {
             let (Some(predicted), Some(Some(samples))) = (predicted, record.outputs.get(index)) else { continue };
-            let place = crate::evaluator::measured(record).position(|o| o == index).unwrap_or(0);
+            let place = crate::output_error::evaluator::measured(record).position(|o| o == index).unwrap_or(0);
             let Some(column) = predicted.get(place * record.len..(place + 1) * record.len) else { continue };
             let lag = problem.lag.get(index).copied().unwrap_or(0);
             of_records.push((factor(samples, column, lag), record));

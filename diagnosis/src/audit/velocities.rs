@@ -1,8 +1,8 @@
 //! Velocities beside the derivatives of the positions of the same bodies: where they contradict each other, one of the two columns is wrong.
 
 use super::remark::{Remark, Weight, file_name};
-use crate::kinematics::{Band, Kinematics};
-use crate::problem::{Problem, Record};
+use crate::recordings::kinematics::{Band, Kinematics};
+use crate::recordings::problem::{Problem, Record};
 use backdrive_plant::model::OutputKind;
 use backdrive_plant::write::round_significant;
 

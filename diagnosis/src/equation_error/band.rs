@@ -1,6 +1,6 @@
 //! Recordings of a band: motion and force through the same low-pass, and as many samples as the band needs.
 
-use crate::problem::{Problem, Record};
+use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::segments;
@@ -16,7 +16,8 @@ pub(crate) fn is_known(problem: &Problem) -> bool {
     let model = &problem.model;
     let is_moved = matches!(model.inputs.as_slice(), [input] if input.kind == InputKind::Motion);
     let is_force = |output: usize| matches!(model.outputs.get(output).map(|o| &o.kind), Some(OutputKind::Reaction(_)));
-    let measures_force = |record: &Record| crate::evaluator::measured(record).eq((0..model.outputs.len()).filter(|o| is_force(*o)).take(1));
+    let measures_force =
+        |record: &Record| crate::output_error::evaluator::measured(record).eq((0..model.outputs.len()).filter(|o| is_force(*o)).take(1));
     model.bodies.len() == 1
         && !model.elements.iter().any(|e| has_memory(e.law.kind().name))
         && is_moved

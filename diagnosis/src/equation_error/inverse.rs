@@ -4,7 +4,7 @@
 //! drift: each law adds to them where it acts.
 
 use super::band::has_memory;
-use crate::problem::{Inverse, Problem, Record, spread};
+use crate::recordings::problem::{Inverse, Problem, Record, spread};
 use backdrive_plant::model::{Hold, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::segments;
@@ -102,9 +102,9 @@ fn turned_record(model: &Model, output: usize, record: &Record) -> Option<Record
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::belief::choice::chosen;
     use crate::equation_error::search_on_forces;
     use crate::search::Settings;
-    use crate::verdict::chosen;
     use backdrive_plant::recording::Recording;
     use backdrive_plant::write::{Edit, Value};
 

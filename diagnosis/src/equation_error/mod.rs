@@ -4,21 +4,20 @@
 //! law, and every pair, is compared with the force in a band in which the motion is resolved. It is judged by its prediction of held-out stretches.
 
 mod band;
-mod belief;
-mod explore;
+pub(crate) mod explore;
 mod gram;
 mod inverse;
 mod on_forces;
-mod room;
+pub(crate) mod room;
 mod search;
 
 use band::{corners, is_known};
-pub use belief::{Belief, Figures};
 pub(crate) use inverse::{inverse, with_model};
 pub use on_forces::OnForces;
 pub(crate) use search::search_on_forces;
 
-use crate::problem::Problem;
+use crate::belief::on_forces::{Figures, figures};
+use crate::recordings::problem::Problem;
 
 /// What was examined on forces, for those who calibrate its confidence: the effect of each law that is claimed, with its figures for the law and for its
 /// kind.
@@ -28,6 +27,6 @@ pub fn figures_of(problem: &Problem) -> Vec<(String, [Figures; 2])> {
         false => Vec::new(),
     };
     let Some(explored) = explore::explore(&rooms, crate::search::Settings::default().effects) else { return Vec::new() };
-    let one = |law: &usize| (rooms[0].named(*law).physics.name.to_string(), belief::figures(&rooms, &explored, *law));
+    let one = |law: &usize| (rooms[0].named(*law).physics.name.to_string(), figures(&rooms, &explored, *law));
     explored.best().laws.iter().map(one).collect()
 }

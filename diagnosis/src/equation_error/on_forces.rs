@@ -1,6 +1,6 @@
 //! What is kept of a search on forces.
 
-use super::belief::Belief;
+use crate::belief::on_forces::Belief;
 use crate::tuning::tuning;
 
 /// Results of a search on forces for its structures.
@@ -10,7 +10,7 @@ pub struct OnForces {
     pub corner_hz: f64,
     /// The corners of all bands that were looked at, Hz.
     pub bands_hz: Vec<f64>,
-    /// The structure that is claimed: ids of its effects, as [`crate::candidate`] joins them.
+    /// The structure that is claimed: ids of its effects, as [`crate::output_error::candidate`] joins them.
     pub claimed: String,
     /// How sure each of its effects is, by id.
     pub beliefs: Vec<(String, Belief)>,

@@ -2,10 +2,10 @@
 
 use super::gram::{Gram, Left, Sum};
 use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
+use crate::output_error::simulate::predict;
+use crate::output_error::structure::{Role, Structure};
 use crate::physics;
-use crate::problem::{Problem, Record};
-use crate::simulate::predict;
-use crate::structure::{Role, Structure};
+use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::model::Model;
 use backdrive_plant::write::Edit;

@@ -1,19 +1,19 @@
 //! A search on forces: what it found, simulated and refined as every search has it.
 
-use super::belief::{Belief, Same, belief, nearest};
 use super::explore::{Explored, Looked, better, explore};
 use super::on_forces::OnForces;
 use super::room::Room;
-use crate::candidate::{Candidate, candidate, key_of, sort};
-use crate::compare::unseen;
-use crate::evaluator::Evaluator;
+use crate::belief::compare::unseen;
+use crate::belief::on_forces::{Belief, Same, belief, nearest};
+use crate::belief::statistics::levels;
 use crate::hypothesis::Hypothesis;
-use crate::problem::{Problem, Record};
+use crate::output_error::candidate::{Candidate, candidate, key_of, sort};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::structure::{FreeParameter, Role, Structure};
+use crate::output_error::work::{Budget, Limit};
+use crate::recordings::problem::{Problem, Record};
 use crate::search::{Search, Settings, Tried};
-use crate::statistics::levels;
-use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
-use crate::work::{Budget, Limit};
 
 /// Searches on forces; `None` where force and motion are not both known. The problem that comes back is the one in the band of the fits.
 pub(crate) fn search_on_forces(
@@ -128,7 +128,7 @@ fn without_what_is_nothing(explored: &Explored, refined: &Candidate, room: &Room
 /// Noise standard deviation of the force's sensor in a band.
 fn sensor_noise(problem: &Problem, corner: f64) -> f64 {
     let measured = |record: &Record| {
-        crate::evaluator::measured(record).filter_map(|output| problem.noise_sd.get(output)).fold(0.0f64, |a, b| a.max(*b))
+        crate::output_error::evaluator::measured(record).filter_map(|output| problem.noise_sd.get(output)).fold(0.0f64, |a, b| a.max(*b))
     };
     let in_band = |record: &Record| measured(record) * super::band::low_pass(record, corner).share_of_white().sqrt();
     problem.fit.iter().map(in_band).fold(f64::MIN_POSITIVE, f64::max)

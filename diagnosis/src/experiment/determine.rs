@@ -4,11 +4,11 @@ use super::planner::Planner;
 use super::rivals::Rival;
 use super::types::{Experiment, Reason};
 use super::words::{described, short};
-use crate::evaluator::Evaluator;
-use crate::problem::Problem;
-use crate::structure::{Role, Structure};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::structure::{Role, Structure};
+use crate::output_error::work::Budget;
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
-use crate::work::Budget;
 use backdrive_signal::statistics::rms;
 
 /// The excitation that determines parameters of a structure which the recordings do not determine. `numbers` are places among [`Structure::free`], `told`

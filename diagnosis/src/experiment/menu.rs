@@ -13,7 +13,7 @@
 //! | impacts | contacts and what is stiff |
 //! | a bias with little on it | asymmetric laws from offsets; a bias closes a gap |
 
-use crate::problem::Problem;
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
 use backdrive_plant::excitation::{Excitation, Grid, Shape, Spacing};
 use backdrive_plant::model::InputKind;

@@ -6,10 +6,10 @@ use super::sensor;
 use super::setup::{Sensors, Setup, Trial};
 use super::types::{Experiment, Reason, repeats};
 use super::words::{self, short};
-use crate::problem::Problem;
-use crate::structure::Structure;
+use crate::output_error::structure::Structure;
+use crate::output_error::work::{Budget, Steps};
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
-use crate::work::{Budget, Steps};
 use backdrive_plant::write::round_significant;
 use rayon::prelude::*;
 

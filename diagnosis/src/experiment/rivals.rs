@@ -1,13 +1,13 @@
 //! Rival models: what each predicts for an experiment, and how much of the difference of two predictions a change of parameters cannot explain.
 
 use super::setup::{Setup, Trial};
-use crate::effort::Effort;
-use crate::evaluator::Evaluator;
-use crate::fit::{Fit, dot};
-use crate::normal_equations::normal_equations;
-use crate::problem::Problem;
-use crate::statistics::correlation_time;
-use crate::structure::{FreeParameter, Structure};
+use crate::belief::statistics::correlation_time;
+use crate::output_error::effort::Effort;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::fit::{Fit, dot};
+use crate::output_error::normal_equations::normal_equations;
+use crate::output_error::structure::{FreeParameter, Structure};
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
 use backdrive_plant::model::{Model, OutputKind};
 use nalgebra::{DMatrix, DVector};

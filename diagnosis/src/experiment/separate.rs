@@ -4,12 +4,12 @@ use super::planner::{Evaluated, Pair, Planner, same};
 use super::rivals::Rival;
 use super::setup::{Setup, Trial};
 use super::types::{Experiment, Reason};
-use crate::candidate::Candidate;
-use crate::fit::Fit;
-use crate::problem::Problem;
-use crate::structure::Structure;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::fit::Fit;
+use crate::output_error::structure::Structure;
+use crate::output_error::work::Budget;
+use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
-use crate::work::Budget;
 use rayon::prelude::*;
 
 /// The excitation that separates fitted structures, the likeliest first. `noise_sd` is the noise standard deviation of each output, in its unit. What

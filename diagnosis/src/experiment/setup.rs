@@ -2,10 +2,10 @@
 
 use super::extra_output::output;
 use super::menu::{Choice, InputRange, constant, scaled};
-use crate::evaluator::measured;
-use crate::problem::{Problem, Record};
-use crate::simulate::{Conditions, predict_under};
-use crate::work::Budget;
+use crate::output_error::evaluator::measured;
+use crate::output_error::simulate::{Conditions, predict_under};
+use crate::output_error::work::Budget;
+use crate::recordings::problem::{Problem, Record};
 use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Model, OutputKind};
 use backdrive_plant::recording::Recording;

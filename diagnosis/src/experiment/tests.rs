@@ -2,16 +2,16 @@
 
 use super::separate::separate_fitted;
 use super::*;
-use crate::candidate::{Candidate, candidate};
-use crate::evaluator::Evaluator;
-use crate::fit::Fit;
+use crate::belief::intervals::Uncertainty;
 use crate::hypothesis::{Hypothesis, Run, Scales};
-use crate::intervals::Uncertainty;
+use crate::output_error::candidate::{Candidate, candidate};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::fit::Fit;
+use crate::output_error::structure::{Role, Structure};
+use crate::output_error::work::Budget;
 use crate::physics;
-use crate::problem::{Problem, Record};
-use crate::structure::{Role, Structure};
+use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
-use crate::work::Budget;
 use backdrive_plant::excitation::load_experiments;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;

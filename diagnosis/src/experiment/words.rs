@@ -2,7 +2,7 @@
 
 use super::setup::Trial;
 use crate::hypothesis::{Hypothesis, Mark};
-use crate::structure::Structure;
+use crate::output_error::structure::Structure;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::excitation::{Excitation, Shape};
 use backdrive_plant::model::{InputKind, Model};

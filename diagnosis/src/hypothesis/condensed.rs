@@ -4,7 +4,7 @@
 
 use super::types::{Form, Hypothesis};
 use crate::physics::physics_named;
-use crate::problem::Stated;
+use crate::recordings::problem::Stated;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
 

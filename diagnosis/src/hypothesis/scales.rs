@@ -1,6 +1,6 @@
 //! How far, how fast and how hard things move: what parameters are measured against.
 
-use crate::problem::Record;
+use crate::recordings::problem::Record;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};

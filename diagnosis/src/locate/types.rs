@@ -23,8 +23,8 @@ pub struct Run<'a> {
     pub model: Option<&'a Model>,
 }
 
-impl<'a> From<&'a crate::problem::Record> for Run<'a> {
-    fn from(record: &'a crate::problem::Record) -> Run<'a> {
+impl<'a> From<&'a crate::recordings::problem::Record> for Run<'a> {
+    fn from(record: &'a crate::recordings::problem::Record) -> Run<'a> {
         let outputs = record.outputs.iter().map(|column| column.as_deref()).collect();
         Run { name: &record.name, period: record.period, inputs: &record.inputs, outputs, model: None }
     }

@@ -2,17 +2,17 @@
 
 use super::nominal::{Nominal, to_its_end};
 use super::share::Work;
-use crate::candidate::{Candidate, candidate, key_of, sort};
-use crate::compare::unseen;
-use crate::evaluator::Evaluator;
-use crate::fit::Fit;
+use crate::belief::compare::unseen;
+use crate::belief::intervals::Uncertainty;
 use crate::hypothesis::{self, Hypothesis};
-use crate::intervals::Uncertainty;
+use crate::output_error::candidate::{Candidate, candidate, key_of, sort};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::fit::Fit;
+use crate::output_error::structure::{FreeParameter, Role, Structure};
+use crate::output_error::work::Budget;
 use crate::physics;
-use crate::race::Course;
-use crate::structure::{FreeParameter, Role, Structure};
+use crate::search::race::Course;
 use crate::tuning::tuning;
-use crate::work::Budget;
 use rayon::prelude::*;
 
 /// An effect may only have helped the other parameters out of a local minimum. So each effect of the best structure is removed again, and the others are

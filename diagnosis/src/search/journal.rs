@@ -1,6 +1,6 @@
 //! What a search did, step by step, so that it can be followed.
 
-use crate::work::Steps;
+use crate::output_error::work::Steps;
 
 /// A step of a search, as it went.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,28 +1,33 @@
 //! Which effects the model lacks: from the nominal model, refitted, to the structures that explain the recordings best.
 
+pub(crate) mod beginnings;
+pub(crate) mod coupled;
 mod ending;
+pub mod excerpts;
 mod journal;
 mod nominal;
+pub mod race;
 mod result;
 mod schedule;
+pub mod screen;
 mod settings;
 mod share;
 mod state;
 mod steps;
 mod view;
 
-use crate::candidate::{key_of, sort};
-use crate::effort::Effort;
-use crate::error_budget::error_budget;
-use crate::evaluator::Evaluator;
-use crate::excerpts::Excerpts;
-use crate::hold::told;
 use crate::hypothesis::{Hypothesis, Place};
+use crate::output_error::candidate::{key_of, sort};
+use crate::output_error::effort::Effort;
+use crate::output_error::error_budget::error_budget;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::hold::told;
+use crate::output_error::work::{Budget, Limit};
 use crate::physics;
-use crate::problem::Problem;
-use crate::race::Course;
+use crate::recordings::problem::Problem;
+use crate::search::excerpts::Excerpts;
+use crate::search::race::Course;
 use crate::tuning::tuning;
-use crate::work::{Budget, Limit};
 pub use journal::{Entry, Outcome};
 use nominal::Nominal;
 pub use result::{Detectable, Search, SearchError, Tried};

@@ -2,21 +2,21 @@
 
 use super::result::SearchError;
 use super::share::Work;
-use crate::candidate::{Candidate, candidate, white};
-use crate::coupling::Coupling;
-use crate::effort::Effort;
-use crate::error_budget::of_driving_motion;
-use crate::evaluator::Evaluator;
-use crate::excerpts::Excerpts;
-use crate::fit::Fit;
+use crate::belief::statistics::{correlation_time, deviation_by_median, levels, whiteness_statistic};
 use crate::hypothesis::{Run, Scales};
-use crate::noise;
-use crate::problem::{Problem, Record};
-use crate::screen::worst_records;
-use crate::statistics::{correlation_time, deviation_by_median, levels, whiteness_statistic};
-use crate::structure::{Role, Structure};
+use crate::output_error::candidate::{Candidate, candidate, white};
+use crate::output_error::coupling::Coupling;
+use crate::output_error::effort::Effort;
+use crate::output_error::error_budget::of_driving_motion;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::fit::Fit;
+use crate::output_error::structure::{Role, Structure};
+use crate::output_error::work::Budget;
+use crate::recordings::noise;
+use crate::recordings::problem::{Problem, Record};
+use crate::search::excerpts::Excerpts;
+use crate::search::screen::worst_records;
 use crate::tuning::tuning;
-use crate::work::Budget;
 use backdrive_plant::model::{InputKind, Model};
 
 /// The nominal model refitted, and what was learnt of the recordings by it.

@@ -1,12 +1,12 @@
 //! What a search found, and why one cannot start.
 
 use super::journal::Entry;
-use crate::candidate::Candidate;
 use crate::equation_error::OnForces;
-use crate::error_budget::BudgetedError;
-use crate::hold::Told;
 use crate::hypothesis::Place;
-use crate::work::Steps;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::error_budget::BudgetedError;
+use crate::output_error::hold::Told;
+use crate::output_error::work::Steps;
 
 /// A hypothesis that was tried alone.
 #[derive(Debug, Clone)]

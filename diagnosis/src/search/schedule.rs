@@ -7,8 +7,8 @@ use super::steps::{
     BesideTheBest, Exchanges, Finer, FromNominal, Laws, More, MorePairs, OneParameter, OtherPlaces, Pairs, Race, Relatives,
     RestoredDefaults, Richer, Ripples, Scans, Singles, Split, Step,
 };
-use crate::candidate::key_of;
-use crate::race::{Course, distinct};
+use crate::output_error::candidate::key_of;
+use crate::search::race::{Course, distinct};
 use crate::tuning::tuning;
 use std::collections::HashSet;
 

@@ -1,7 +1,7 @@
 //! How much to search, and for what.
 
+use crate::output_error::work::{Limit, Steps};
 use crate::tuning::tuning;
-use crate::work::{Limit, Steps};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,6 @@
 //! Shares of the work of a search.
 
-use crate::work::{Budget, Steps};
+use crate::output_error::work::{Budget, Steps};
 
 /// How much work a search may do.
 pub(super) struct Work<'a> {

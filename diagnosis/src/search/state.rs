@@ -4,10 +4,10 @@ use super::journal::{Entry, Outcome};
 use super::result::Tried;
 use super::share::Work;
 use super::view::View;
-use crate::candidate::{Candidate, advantage_over, done, key_of, sort};
 use crate::hypothesis::Hypothesis;
-use crate::race::{Course, Seed, distinct};
-use crate::structure::Structure;
+use crate::output_error::candidate::{Candidate, advantage_over, done, key_of, sort};
+use crate::output_error::structure::Structure;
+use crate::search::race::{Course, Seed, distinct};
 use crate::tuning::tuning;
 use std::collections::HashSet;
 

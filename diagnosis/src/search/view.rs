@@ -1,19 +1,19 @@
 //! What screening sees, and what would have been seen.
 
 use super::result::Detectable;
-use crate::candidate::{Candidate, candidate};
-use crate::effort::Effort;
-use crate::evaluator::Evaluator;
-use crate::excerpts::Excerpts;
-use crate::fit::Fit;
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
-use crate::problem::Record;
-use crate::race::Seed;
-use crate::screen::{Promise, Screen, pairs};
-use crate::structure::Structure;
+use crate::output_error::candidate::{Candidate, candidate};
+use crate::output_error::effort::Effort;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::fit::Fit;
+use crate::output_error::structure::Structure;
+use crate::output_error::work::Steps;
+use crate::recordings::problem::Record;
+use crate::search::excerpts::Excerpts;
+use crate::search::race::Seed;
+use crate::search::screen::{Promise, Screen, pairs};
 use crate::tuning::tuning;
-use crate::work::Steps;
 use backdrive_plant::model::Model;
 use std::collections::HashSet;
 

@@ -55,7 +55,7 @@ group! {
         glitch_samples: usize = 3, "samples", Statistics("two may be a transmission error that moves no fit");
         /// Share of the samples that glitches have, at most.
         glitch_share: f64 = 0.02, "-", Judgement("what is off more often is no glitch");
-        /// Log-odds of a finding: a constant, then one for each of its figures, see [`crate::verdict::Figures`].
+        /// Log-odds of a finding: a constant, then one for each of its figures, see [`crate::belief::confidence::Figures`].
         confidence: [f64; 12] = [-1.26, 0.465, 0.0936, 0.0, 0.295, 1.15, 0.0, -0.239, -1.37, -0.996, -0.755, 0.0], "log-odds", Measured("a logistic regression on drawn cases: `diagnosis/tests/concealed/calibrate.py fit`; docs/diagnosis.md says on which");
         /// Log-odds that some physics of a finding's family is at its place, as `confidence`.
         family_confidence: [f64; 12] = [-3.18, 1.6, 0.357, 0.0, 0.0, 1.02, -0.0964, 0.0, 0.0, -0.368, 0.0, 0.162], "log-odds", Measured("`diagnosis/tests/concealed/calibrate.py fit-family`, as `confidence`");

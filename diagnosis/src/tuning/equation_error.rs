@@ -41,7 +41,7 @@ group! {
         picked: f64 = 1.0, "numbers", Statistics("which of a dozen laws it is says as much as a number known to a tenth; two laws are a rarer cause than one with their numbers");
         /// Numbers that a rival may have more than the chosen structure.
         rival_numbers: usize = 2, "numbers", Judgement("what needs more than one law more explains anything");
-        /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::equation_error::Figures`].
+        /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::belief::on_forces::Figures`].
         confidence: [f64; 7] = [1.927, -0.353, 1.375, 1.749, 0.507, 0.0, 0.129], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
         /// The same of its kind.
         kind_confidence: [f64; 7] = [1.571, 1.0, 0.947, 2.285, 0.149, 0.0, -0.135], "log-odds", Measured("as `confidence`");

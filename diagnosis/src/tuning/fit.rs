@@ -1,7 +1,7 @@
 //! How a structure is fitted.
 
 use super::table::group;
-use crate::effort::Effort;
+use crate::output_error::effort::Effort;
 
 group! {
     /// How a structure is fitted: damped Gauss-Newton steps (Levenberg-Marquardt) with secant updates of the derivatives.

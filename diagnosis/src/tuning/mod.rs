@@ -6,6 +6,7 @@
 
 mod claim;
 mod coupling;
+pub mod document;
 mod equation_error;
 mod experiment;
 mod fit;

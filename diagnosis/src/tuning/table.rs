@@ -1,6 +1,6 @@
 //! What a table of tuning is made of: entries with their unit, value and evidence.
 
-use crate::effort::Effort;
+use crate::output_error::effort::Effort;
 
 /// What a value rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

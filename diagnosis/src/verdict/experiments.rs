@@ -1,16 +1,16 @@
 //! The next experiment, or why none would help.
 
-use super::choice::{exchanged, nearest, richer};
-use super::decision::Decision;
 use super::remaining::next_effect;
 use super::rounded::rounded;
 use super::types::{NextExperiment, Planned, Refused, Sensor, Word};
-use crate::candidate::Candidate;
+use crate::belief::choice::{exchanged, nearest, richer};
+use crate::belief::decision::Decision;
+use crate::belief::intervals::NORMAL_975;
 use crate::experiment::{Experiment, NewSensor, Reason, confirm, excite, separate};
-use crate::intervals::NORMAL_975;
-use crate::problem::Problem;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::work::Budget;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
-use crate::work::Budget;
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-experiment.toml";

@@ -1,23 +1,23 @@
 //! What was found: each effect with its place, its parameters, and its alternatives.
 
-use super::choice::{behind, chosen, evidence, exchanged};
-use super::confidence::{Figures, figures, probability, probability_of_family, without};
-use super::plausible::is_timing;
 use super::rounded::rounded;
 use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
-use crate::candidate::Candidate;
+use crate::belief::choice::{behind, chosen, evidence, exchanged};
+use crate::belief::confidence::{Figures, figures, probability, probability_of_family, without};
+use crate::belief::intervals::Uncertainty;
+use crate::belief::plausible::is_timing;
 use crate::hypothesis::Hypothesis;
-use crate::intervals::Uncertainty;
-use crate::problem::Problem;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::structure::Role;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
-use crate::structure::Role;
 use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
 
 /// Each effect of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
 /// and not among them.
-pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
+pub(crate) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
     let is_companion = |which: usize| {
         let companions = search.forces.as_ref().map_or(&[][..], |forces| forces.companions.as_slice());
         best.structure.added.get(which).is_some_and(|h| companions.contains(&h.id))
@@ -30,7 +30,7 @@ pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spr
 }
 
 /// Whether one of the effects of a structure is a matter of timing.
-pub(super) fn is_timing_of(problem: &Problem, best: &Candidate, which: usize) -> bool {
+pub(crate) fn is_timing_of(problem: &Problem, best: &Candidate, which: usize) -> bool {
     let period = problem.fit.iter().map(|r| r.period).fold(f64::INFINITY, f64::min);
     let values = best.structure.added_of(&best.fit.values);
     best.structure.added.get(which).zip(values.get(which)).is_some_and(|(hypothesis, values)| is_timing(hypothesis, values, period))
@@ -79,7 +79,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
 }
 
 /// A finding with rivals is not certain: the probability that it or one of its rivals is right is shared among them by how near they come.
-pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
+pub(crate) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
     if search.forces.is_some() {
         return; // the beliefs contain the rivals already
     }
@@ -170,7 +170,7 @@ fn parameters_of(best: &Candidate, spread: &Uncertainty, which: usize) -> BTreeM
 }
 
 /// Parameters of the nominal model as the fit has them, by their path.
-pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -> BTreeMap<String, Moved> {
+pub(crate) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -> BTreeMap<String, Moved> {
     let mut all = BTreeMap::new();
     for (index, number) in best.structure.free.iter().enumerate() {
         let Role::Stated(i) = number.role else { continue };
@@ -190,7 +190,7 @@ pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -
 }
 
 /// What would have been seen: for each effect the smallest size at the place where it shows best.
-pub(super) fn detectable(search: &Search) -> Vec<Detectable> {
+pub(crate) fn detectable(search: &Search) -> Vec<Detectable> {
     let one = |d: &crate::search::Detectable| Detectable {
         physics: d.physics.to_string(),
         place: d.place.clone(),

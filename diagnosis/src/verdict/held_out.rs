@@ -3,10 +3,10 @@
 use super::rounded::rounded;
 use super::types::{HeldOut, RecordErrors};
 use crate::audit::file_name;
-use crate::candidate::Candidate;
-use crate::compare::mean_squares;
-use crate::evaluator::measured;
-use crate::problem::{Problem, Record};
+use crate::belief::compare::mean_squares;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::evaluator::measured;
+use crate::recordings::problem::{Problem, Record};
 use crate::search::Search;
 use std::collections::BTreeMap;
 

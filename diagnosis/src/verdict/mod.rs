@@ -1,29 +1,19 @@
 //! The result of a search: the verdict, the nominal model's file with what was found, and the files beside it.
 
-mod beaten;
-mod choice;
-mod confidence;
-mod decision;
 mod experiments;
-mod findings;
+pub(crate) mod findings;
 mod held_out;
 mod models;
-mod plausible;
 mod remaining;
 mod rounded;
 mod schema;
 mod sentence;
 mod shows;
-mod signals;
+pub(crate) mod signals;
 mod timing;
 pub(crate) mod types;
+pub mod words;
 
-use crate::tuning::tuning;
-pub use beaten::{Beaten, Why, beaten};
-pub use choice::chosen;
-pub(crate) use choice::decided_by_unseen;
-pub use confidence::{Figures, NAMES as FIGURES};
-pub use decision::without_what_may_be_nothing;
 pub use experiments::EXPERIMENT_FILE;
 pub use findings::figures_of;
 pub use models::VerdictError;
@@ -32,15 +22,17 @@ pub use timing::timing;
 pub use types::*;
 
 use crate::audit;
-use crate::candidate::Candidate;
-use crate::compare::unseen;
+use crate::belief::compare::unseen;
+use crate::belief::decision::{Decision, Doubt, decide};
+use crate::belief::plausible;
 use crate::locate::Location;
-use crate::problem::Problem;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::structure::{Role, Structure};
+use crate::output_error::work::{Budget, Limit};
+use crate::recordings::problem::Problem;
 use crate::search::Search;
-use crate::structure::{Role, Structure};
-use crate::work::{Budget, Limit};
+use crate::tuning::tuning;
 use backdrive_plant::model::Model;
-use decision::{Doubt, decide};
 use experiments::next_experiment;
 use findings::{detectable, moved};
 use held_out::held_out;
@@ -120,7 +112,7 @@ pub fn verdict(
 
 /// Errors on held-out recordings. Where what was found predicts them worse than the model as given does, the model as given is returned unchanged, and
 /// nothing is claimed as likelier than not.
-fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut decision::Decision) -> HeldOut {
+fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut Decision) -> HeldOut {
     let errors = held_out(problem, search, decision.best, decision.changes);
     let is_worse_than = |other: Option<f64>| other.zip(errors.nrmse_after).is_some_and(|(other, after)| after > other);
     let unseen = !problem.held_out.is_empty();
@@ -145,7 +137,7 @@ fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mu
 }
 
 /// Whether, of a device that forces drive and whose laws were looked at on forces, the model that would be written simulates the held-out motion worse.
-fn is_worse_simulated(problem: &Problem, decision: &decision::Decision) -> bool {
+fn is_worse_simulated(problem: &Problem, decision: &Decision) -> bool {
     let Some(recorded) = problem.inverse.as_ref().map(|inverse| inverse.recorded.as_ref()) else { return false };
     let left = |model: Model| {
         let fixed = Problem { model, stated: Vec::new(), ..recorded.clone() };

@@ -1,10 +1,10 @@
 //! Models as they are after the diagnosis.
 
-use crate::candidate::Candidate;
+use crate::belief::intervals::Uncertainty;
+use crate::belief::parameters::stated_edits;
 use crate::hypothesis::apply_edits;
-use crate::intervals::Uncertainty;
-use crate::parameters::stated_edits;
-use crate::problem::Problem;
+use crate::output_error::candidate::Candidate;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
 use crate::tuning::tuning;
 use backdrive_plant::write::{patch, round_significant};

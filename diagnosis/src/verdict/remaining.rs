@@ -1,13 +1,13 @@
 //! What remains beside what was found: a statement of its own, for a claim is not taken back by it and does not hide it.
 
-use super::decision::Decision;
 use super::rounded::rounded;
 use super::signals::place_in_signals;
 use super::types::{HeldOut, Remaining};
-use crate::candidate::Candidate;
-use crate::problem::Problem;
+use crate::belief::decision::Decision;
+use crate::output_error::candidate::Candidate;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
-use crate::words;
+use crate::verdict::words;
 
 /// The residual of the claimed explanation; `None` where nothing was held against anything.
 pub(super) fn remaining(problem: &Problem, search: &Search, decision: &Decision, held_out: &HeldOut) -> Option<Remaining> {

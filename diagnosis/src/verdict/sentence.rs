@@ -1,11 +1,11 @@
 //! The verdict in one sentence.
 
-use super::decision::{Decision, Doubt};
 use super::types::{Finding, Word};
+use crate::belief::decision::{Decision, Doubt};
 use crate::equation_error::OnForces;
 use crate::hypothesis::Place;
 use crate::tuning::tuning;
-use crate::words;
+use crate::verdict::words;
 use backdrive_plant::write::round_significant;
 
 /// `planned`: whether there is a next experiment.

@@ -1,11 +1,11 @@
 //! Where the refitted nominal model and the recordings part: when, at which frequencies, and in which state of the device.
 
-use super::decision::Decision;
 use super::signals::place_in_signals;
 use super::types::{Finding, Where, Word};
+use crate::belief::decision::Decision;
 use crate::locate::{self, Location};
 use crate::physics::physics_named;
-use crate::problem::Problem;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
 
 /// Where the refitted nominal model and the recordings part.

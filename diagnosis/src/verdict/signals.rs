@@ -1,17 +1,17 @@
 //! When and at which frequencies the residual is large, glitches, and inputs that nobody measured.
 
 use super::types::Where;
-use crate::candidate::Candidate;
-use crate::evaluator::Evaluator;
-use crate::problem::Problem;
-use crate::statistics::deviation_by_median;
+use crate::belief::statistics::deviation_by_median;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::evaluator::Evaluator;
+use crate::recordings::problem::Problem;
+use crate::recordings::unknown::{Estimated, Unknown, estimated};
 use crate::tuning::tuning;
-use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
 
 /// Times at which a motion sensor is far off for a moment while all the rest is measuring error, s: glitches, which no effect in the device causes. Empty
 /// where the rest is no measuring error, or a reversal of friction could be it.
-pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
+pub(crate) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
     use backdrive_plant::model::OutputKind;
     let evaluator = Evaluator::new(problem);
     let mut all = Vec::new();
@@ -44,7 +44,7 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
 }
 
 /// When and at which frequencies residuals, in the order of an evaluator, are largest.
-pub(super) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[f64; 2]]) -> Option<Where> {
+pub(crate) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[f64; 2]]) -> Option<Where> {
     let evaluator = Evaluator::new(problem);
     let mut strongest: Option<(f64, [f64; 2], [f64; 2])> = None;
     for (r, _, range) in evaluator.layout() {
@@ -90,7 +90,7 @@ fn band(samples: &[f64], period: f64) -> [f64; 2] {
 }
 
 /// What was found of the inputs that nobody measured.
-pub(super) fn unknown_inputs(problem: &Problem, best: &Candidate) -> Vec<Estimated> {
+pub(crate) fn unknown_inputs(problem: &Problem, best: &Candidate) -> Vec<Estimated> {
     let records = best.structure.with_unknown(problem, &problem.fit, &best.fit.values);
     let one = |unknown: &Unknown| {
         let name = problem.model.inputs.get(unknown.input).map_or("", |i| i.name.as_str());

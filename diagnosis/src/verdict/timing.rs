@@ -1,10 +1,10 @@
 //! What is a matter of timing: an effect that comes late by a small share of a sample period.
 
-use super::choice::chosen;
 use super::findings::is_timing_of;
-use super::plausible::lag;
 use crate::audit::{Remark, Weight};
-use crate::problem::Problem;
+use crate::belief::choice::chosen;
+use crate::belief::plausible::lag;
+use crate::recordings::problem::Problem;
 use crate::search::Search;
 use crate::tuning::tuning;
 

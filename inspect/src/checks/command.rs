@@ -6,7 +6,7 @@ use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
 use crate::numeric::{quantile, width};
 use crate::recording::{Recording, Signal};
-use backdrive_diagnosis::follow::{Follow, Profile, follow};
+use backdrive_diagnosis::recordings::follow::{Follow, Profile, follow};
 use backdrive_signal::low_pass::LowPass;
 
 /// Lags that are tried: a command may be this late, and the position this early (columns exchanged), s.

@@ -8,8 +8,8 @@ use crate::finding::{Finding, FindingKind};
 use crate::joints::Joint;
 use crate::numeric::{deviation, extremes};
 use crate::recording::Recording;
-use backdrive_diagnosis::follow::student;
-use backdrive_diagnosis::kinematics::Band;
+use backdrive_diagnosis::recordings::follow::student;
+use backdrive_diagnosis::recordings::kinematics::Band;
 use backdrive_signal::derivative;
 use nalgebra::{SMatrix, SVector};
 

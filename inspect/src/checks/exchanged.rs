@@ -7,7 +7,7 @@ use crate::joints::Joint;
 use crate::numeric::thinned;
 use crate::quantity::Quantity;
 use crate::recording::Recording;
-use backdrive_diagnosis::follow::follow;
+use backdrive_diagnosis::recordings::follow::follow;
 
 /// Rate at which joints are compared, Hz, and lags that are tried, s.
 const COARSE_HZ: f64 = 25.0;

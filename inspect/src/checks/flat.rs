@@ -6,7 +6,7 @@ use crate::joints::Joint;
 use crate::numeric::{extremes, median, quantile, resolution, runs, span};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::noise;
 
 /// Least length of a frozen stretch, in samples and in seconds.
 const LEAST_ROWS: usize = 8;

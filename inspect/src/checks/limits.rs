@@ -6,7 +6,7 @@ use crate::numeric::{extremes, median, resolution, span, width};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::audit::limits_reached;
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::noise;
 use backdrive_plant::recording::units::Kind;
 use backdrive_signal::derivative;
 use backdrive_signal::low_pass::LowPass;

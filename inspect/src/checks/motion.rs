@@ -3,7 +3,7 @@
 use crate::joints::Joint;
 use crate::numeric::span;
 use crate::recording::{Recording, Signal};
-use backdrive_diagnosis::kinematics::Band;
+use backdrive_diagnosis::recordings::kinematics::Band;
 
 /// The band of a recording.
 pub fn band_of(recording: &Recording) -> Band {

@@ -3,7 +3,7 @@
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::numeric::quantile;
 use crate::recording::Recording;
-use backdrive_diagnosis::signal::density;
+use backdrive_diagnosis::recordings::signal::density;
 
 /// The factors of rate that are tried.
 const FACTORS: std::ops::RangeInclusive<usize> = 2..=12;

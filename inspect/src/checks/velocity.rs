@@ -5,8 +5,8 @@ use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
 use crate::recording::Recording;
-use backdrive_diagnosis::follow::follow;
-use backdrive_diagnosis::kinematics::{Band, EXPLAINED, Kinematics};
+use backdrive_diagnosis::recordings::follow::follow;
+use backdrive_diagnosis::recordings::kinematics::{Band, EXPLAINED, Kinematics};
 
 /// Below this one it is not, where both move far beyond their noise.
 const UNEXPLAINED: f64 = 0.4;

@@ -4,8 +4,8 @@ use super::types::Interval;
 use crate::joints::Joint;
 use crate::numeric::{deviation, mean, median, span};
 use crate::recording::Recording;
-use backdrive_diagnosis::follow::student;
-use backdrive_diagnosis::noise;
+use backdrive_diagnosis::recordings::follow::student;
+use backdrive_diagnosis::recordings::noise;
 
 /// A command is held where it stays within this share of its range, for at least this number of seconds and lags.
 const STILL: f64 = 2e-3;

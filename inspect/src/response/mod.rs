@@ -8,7 +8,7 @@ mod types;
 use crate::joints::Joint;
 use crate::numeric::{span, thinned};
 use crate::recording::Recording;
-use backdrive_diagnosis::follow::Profile;
+use backdrive_diagnosis::recordings::follow::Profile;
 use backdrive_signal::derivative;
 use backdrive_signal::statistics::rms;
 

@@ -1,7 +1,7 @@
 //! Figures of an arm: what remains, torque and its predictions, friction, the motion to record next.
 
 use crate::parts::{file_name, sentence};
-use backdrive_arms::drawn::{Drawn, DrawnJoint};
+use backdrive_diagnosis::arms::drawn::{Drawn, DrawnJoint};
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Tone, number};
 

@@ -2,13 +2,13 @@
 
 use super::sentences::{confidence, parameters};
 use crate::parts::{file_name, sentence};
-use backdrive_arms::diagnose::Tried;
-use backdrive_arms::judge::AGAINST;
-use backdrive_arms::problem::Problem;
-use backdrive_arms::sentences::{unexplained, words};
+use backdrive_diagnosis::arms::diagnose::Tried;
+use backdrive_diagnosis::arms::judge::AGAINST;
+use backdrive_diagnosis::arms::problem::Problem;
+use backdrive_diagnosis::arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::verdict::words as said;
 use backdrive_diagnosis::verdict::{Interval, Verdict};
-use backdrive_diagnosis::words as said;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 
 /// Rows of what was tried that are shown at once.

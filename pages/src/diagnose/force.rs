@@ -2,12 +2,12 @@
 
 use super::phrases::adds;
 use crate::parts::{file_name, sentence};
-use backdrive_diagnosis::candidate::Candidate;
+use backdrive_diagnosis::belief::evidence::{Curve, Evidence, Trace, evidence};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::evidence::{Curve, Evidence, Trace, evidence};
 use backdrive_diagnosis::hypothesis::{Against, Place};
 use backdrive_diagnosis::locate::{Candidate as Located, Location, Variable};
-use backdrive_diagnosis::words;
+use backdrive_diagnosis::output_error::candidate::Candidate;
+use backdrive_diagnosis::verdict::words;
 use backdrive_plant::describe::unit_for;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, percent, si};
 

@@ -2,11 +2,11 @@
 
 use super::phrases::adds;
 use crate::parts::file_name;
-use backdrive_diagnosis::candidate::Candidate;
-use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};
+use backdrive_diagnosis::belief::compare::{Predicted, density, predictions, qualities};
+use backdrive_diagnosis::belief::parameters::unit_of_output;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::parameters::unit_of_output;
-use backdrive_diagnosis::problem::Record;
+use backdrive_diagnosis::output_error::candidate::Candidate;
+use backdrive_diagnosis::recordings::problem::Record;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
 /// Pairs of record and output that are drawn at once; the rest is folded away.
@@ -56,7 +56,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         let diagnosed = quality(&best.structure, &best.fit.values);
         let Some(last) = &diagnosed else { continue };
         for (i, q) in last.iter().enumerate() {
-            let of = |all: &Option<Vec<backdrive_diagnosis::compare::Quality>>| {
+            let of = |all: &Option<Vec<backdrive_diagnosis::belief::compare::Quality>>| {
                 all.as_ref().and_then(|a| a.get(i)).map_or("–".to_string(), |q| percent(q.nrmse))
             };
             let tone = if q.floors < 1.15 { Tone::Good } else { Tone::Warning };

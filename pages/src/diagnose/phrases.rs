@@ -1,6 +1,6 @@
 //! Phrases that every part of the page uses in the same way.
 
-use backdrive_diagnosis::candidate::Candidate;
+use backdrive_diagnosis::output_error::candidate::Candidate;
 use backdrive_diagnosis::verdict::Word;
 use backdrive_report::Tone;
 

@@ -1,9 +1,9 @@
 //! The verdict of one axis in words, for terminal and page.
 
-use backdrive_diagnosis::error_budget::{BudgetedError, Source};
 use backdrive_diagnosis::hypothesis::Family;
+use backdrive_diagnosis::output_error::error_budget::{BudgetedError, Source};
+use backdrive_diagnosis::verdict::words;
 use backdrive_diagnosis::verdict::{Alternative, Estimate, Finding, Interval, NextExperiment, Parameter, Where};
-use backdrive_diagnosis::words;
 use backdrive_report::{number, si};
 
 /// How sure a finding is: `well supported (97 %)`; where its kind is surer than its law, `dry friction there: well supported (97 %); this law of it: weakly

@@ -5,7 +5,7 @@ use crate::estimate::estimate;
 use crate::offered::Step;
 use crate::parts::{ending, file_name, sentence, todo};
 use backdrive_diagnosis::verdict::Parameter;
-use backdrive_diagnosis::words as said;
+use backdrive_diagnosis::verdict::words as said;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_servo::diagnose::{Answer, Found, Judged};
 use backdrive_servo::problem::Problem;

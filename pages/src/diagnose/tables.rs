@@ -2,10 +2,10 @@
 
 use super::phrases::adds;
 use backdrive_diagnosis::audit::Weight;
-use backdrive_diagnosis::candidate::{Candidate, advantage_over};
+use backdrive_diagnosis::belief::intervals::Uncertainty;
+use backdrive_diagnosis::belief::parameters::{Row, correlated, rows};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::intervals::Uncertainty;
-use backdrive_diagnosis::parameters::{Row, correlated, rows};
+use backdrive_diagnosis::output_error::candidate::{Candidate, advantage_over};
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 
 /// Hypotheses that are shown at once.
@@ -77,7 +77,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
             };
             let taken = tried.taken.map_or("not fitted".to_string(), percent);
             table.push([
-                Cell::from(backdrive_diagnosis::words::physics(physics)),
+                Cell::from(backdrive_diagnosis::verdict::words::physics(physics)),
                 place.into(),
                 percent(tried.promised).into(),
                 taken.into(),
@@ -180,7 +180,7 @@ pub(super) fn per_record(page: &mut Page, found: &Diagnosis) {
         let chance = if across.own.iter().filter(|o| o.determined).count() < 2 {
             "–".to_string()
         } else {
-            backdrive_diagnosis::words::share(across.p_value)
+            backdrive_diagnosis::verdict::words::share(across.p_value)
         };
         cells.push(Cell::tone(chance, tone));
         table.push(cells);

@@ -8,7 +8,7 @@ use super::options::{Attached, Choice, Driven, Options, Start};
 use super::plan::Plan;
 use super::write::Seen;
 use backdrive_bags::Reader;
-use backdrive_diagnosis::noise::step_of;
+use backdrive_diagnosis::recordings::noise::step_of;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Piece, Recording, Source, read_csv};
 use backdrive_report::number;

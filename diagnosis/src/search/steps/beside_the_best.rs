@@ -1,14 +1,14 @@
 //! Hypotheses screened again with a structure that was found.
 
 use super::step::{Race, Step, Terms};
-use crate::candidate::{Candidate, distinct_structures, simplest_of};
-use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
-use crate::race::{Course, Seed};
-use crate::screen::{Promise, Screen};
+use crate::output_error::candidate::{Candidate, distinct_structures, simplest_of};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::work::Steps;
+use crate::search::race::{Course, Seed};
+use crate::search::screen::{Promise, Screen};
 use crate::search::state::State;
 use crate::tuning::tuning;
-use crate::work::Steps;
 use std::collections::HashSet;
 
 /// What only shows beside a law that was found shows little coupled to the motion of the nominal model.

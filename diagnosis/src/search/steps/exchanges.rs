@@ -2,12 +2,12 @@
 
 use super::extensions::extensions;
 use super::step::Step;
-use crate::candidate::{Candidate, candidate};
 use crate::hypothesis::Hypothesis;
-use crate::race::{Course, Seed};
+use crate::output_error::candidate::{Candidate, candidate};
+use crate::output_error::structure::Structure;
+use crate::search::race::{Course, Seed};
 use crate::search::state::State;
 use crate::search::view::View;
-use crate::structure::Structure;
 use crate::tuning::tuning;
 
 /// Each effect of the best exchanged for what promises most in its place.

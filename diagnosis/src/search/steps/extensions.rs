@@ -1,8 +1,8 @@
 //! A structure with one effect more.
 
-use crate::candidate::Candidate;
-use crate::race::{Course, Seed};
-use crate::screen::Promise;
+use crate::output_error::candidate::Candidate;
+use crate::search::race::{Course, Seed};
+use crate::search::screen::Promise;
 use crate::search::view::View;
 use crate::tuning::tuning;
 use std::collections::HashSet;

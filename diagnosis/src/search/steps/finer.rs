@@ -1,9 +1,9 @@
 //! Laws of the best, resolved more finely.
 
 use super::step::{Step, Terms};
-use crate::candidate::{Candidate, distinct_structures};
 use crate::hypothesis;
-use crate::race::{Course, Seed};
+use crate::output_error::candidate::{Candidate, distinct_structures};
+use crate::search::race::{Course, Seed};
 use crate::search::state::State;
 use crate::tuning::tuning;
 

@@ -2,9 +2,9 @@
 
 use super::near::brought_near;
 use super::step::{Step, Terms};
-use crate::candidate::Candidate;
-use crate::evaluator::Evaluator;
-use crate::race::Seed;
+use crate::output_error::candidate::Candidate;
+use crate::output_error::evaluator::Evaluator;
+use crate::search::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 

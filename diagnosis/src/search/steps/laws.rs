@@ -1,7 +1,7 @@
 //! Every law at the place of the best: where one law helps another one may be the right one.
 
 use super::step::Step;
-use crate::race::{Seed, distinct};
+use crate::search::race::{Seed, distinct};
 use crate::search::state::State;
 use crate::tuning::tuning;
 

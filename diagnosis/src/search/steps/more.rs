@@ -2,8 +2,8 @@
 
 use super::extensions::extensions;
 use super::step::Step;
-use crate::candidate::distinct_structures;
-use crate::race::Seed;
+use crate::output_error::candidate::distinct_structures;
+use crate::search::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 

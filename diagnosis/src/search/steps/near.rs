@@ -1,9 +1,9 @@
 //! Seeds that start far from where they belong, with the patience that the nominal model has at first.
 
-use crate::effort::Effort;
-use crate::evaluator::Evaluator;
-use crate::race::{Course, Seed};
-use crate::structure::Role;
+use crate::output_error::effort::Effort;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::structure::Role;
+use crate::search::race::{Course, Seed};
 use crate::tuning::tuning;
 
 /// Seeds fitted as the nominal model is at first: beside fits that begin where another one ended they would be dropped after their first steps. `coarse` holds

@@ -1,7 +1,7 @@
 //! Laws of one parameter, whatever screening promised of them.
 
 use super::step::Step;
-use crate::race::Seed;
+use crate::search::race::Seed;
 use crate::search::state::State;
 
 /// Laws of one parameter: to first order they may do no more than the nominal parameters do together.

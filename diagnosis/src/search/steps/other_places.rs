@@ -2,10 +2,10 @@
 
 use super::near::brought_near;
 use super::step::{Step, Terms};
-use crate::candidate::{Candidate, key_of, simplest};
-use crate::evaluator::Evaluator;
 use crate::hypothesis::{Family, Hypothesis, Parameter, Place};
-use crate::race::{Course, Seed};
+use crate::output_error::candidate::{Candidate, key_of, simplest};
+use crate::output_error::evaluator::Evaluator;
+use crate::search::race::{Course, Seed};
 use crate::search::state::State;
 use crate::tuning::tuning;
 use backdrive_plant::model::Model;

@@ -1,10 +1,10 @@
 //! Simpler laws of the family of the best in its place, and, where residuals remain, laws that contain it.
 
 use super::step::{Step, Terms};
-use crate::candidate::Candidate;
 use crate::hypothesis::{self, Hypothesis};
+use crate::output_error::candidate::Candidate;
 use crate::physics;
-use crate::race::{Course, Seed};
+use crate::search::race::{Course, Seed};
 use crate::search::state::State;
 
 /// A law that wins with more parameters must be better than its simpler relatives, whatever their screening value. Far from the noise, where fits were cut

@@ -2,8 +2,8 @@
 
 use super::step::{Step, Terms};
 use crate::hypothesis::Place;
-use crate::race::{Course, Seed};
-use crate::screen::Promise;
+use crate::search::race::{Course, Seed};
+use crate::search::screen::Promise;
 use crate::search::state::State;
 use crate::tuning::tuning;
 use std::collections::HashSet;

@@ -1,9 +1,9 @@
 //! A law of many parameters that replaces the best.
 
 use super::step::Step;
-use crate::candidate::distinct_structures;
 use crate::hypothesis::{Family, Hypothesis};
-use crate::race::Seed;
+use crate::output_error::candidate::distinct_structures;
+use crate::search::race::Seed;
 use crate::search::state::State;
 
 /// Physics of many parameters come in where simpler relatives do not suffice.

@@ -1,7 +1,7 @@
 //! Ripples that stand alone in the spectrum of their force.
 
 use super::step::{Race, Step, Terms};
-use crate::race::Seed;
+use crate::search::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 

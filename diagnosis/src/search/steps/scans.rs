@@ -1,12 +1,12 @@
 //! Laws whose misfit has a valley at every few per cent of their size, such as play: from sizes all over the range.
 
 use super::step::{Race, Step, Terms};
-use crate::candidate::{Candidate, distinct_structures};
-use crate::evaluator::Evaluator;
 use crate::hypothesis::{Family, Hypothesis};
-use crate::race::{Course, Seed, distinct, predicted_cost};
+use crate::output_error::candidate::{Candidate, distinct_structures};
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::structure::Structure;
+use crate::search::race::{Course, Seed, distinct, predicted_cost};
 use crate::search::state::State;
-use crate::structure::Structure;
 use crate::tuning::tuning;
 
 /// A backlash of another size meets its sides at other times, so the misfit of a simulation does not show how far off a size is. The refit of a model

@@ -1,7 +1,7 @@
 //! Single effects, those that promise most first: where one of them reaches the noise, the rest have nothing left to explain.
 
 use super::step::Step;
-use crate::race::Seed;
+use crate::search::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 

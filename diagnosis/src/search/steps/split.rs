@@ -2,13 +2,13 @@
 
 use super::near::brought_near;
 use super::step::{Step, Terms};
-use crate::candidate::{Candidate, distinct_structures};
-use crate::effort::Effort;
-use crate::evaluator::Evaluator;
-use crate::race::{Course, Seed, distinct};
-use crate::screen::Projector;
+use crate::output_error::candidate::{Candidate, distinct_structures};
+use crate::output_error::effort::Effort;
+use crate::output_error::evaluator::Evaluator;
+use crate::output_error::structure::Structure;
+use crate::search::race::{Course, Seed, distinct};
+use crate::search::screen::Projector;
 use crate::search::state::State;
-use crate::structure::Structure;
 use crate::tuning::tuning;
 
 /// To first order, a compliance in series with a body behind it has the same effect as a softer joint and heavier ends. So screening detects little of it.

@@ -1,6 +1,6 @@
 //! The properties that a step of a search declares.
 
-use crate::race::Seed;
+use crate::search::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
 

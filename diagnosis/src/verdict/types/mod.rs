@@ -14,8 +14,8 @@ pub use servo::{ServoAnswer, ServoErrors, ServoPart, SharedCause};
 pub use shown::Where;
 
 use crate::audit::{self, Weight};
-use crate::error_budget::BudgetedError;
-use crate::unknown::Estimated;
+use crate::output_error::error_budget::BudgetedError;
+use crate::recordings::unknown::Estimated;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

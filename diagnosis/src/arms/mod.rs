@@ -1,0 +1,42 @@
+//! Which joint of an arm does what its model leaves out, from logs of position, velocity and torque of every joint.
+//!
+//! [`problem::Problem`] is a model with a robot and its logs. [`diagnose::diagnose`] regresses the measured torque on the torque that the measured motion
+//! takes ([`regression`]: inertial parameters, friction and the rest, all through the same filter). It searches for the effects that predict held-out
+//! segments of the logs ([`search`]), and simulates the arm in closed loop with and without them ([`judge`]). The result is the same verdict file as for a
+//! diagnosis of one axis ([`verdict`]).
+//!
+//! How it works and where it should not be trusted: docs/arms.md, "Diagnosis of an arm".
+
+pub mod audit;
+pub mod base;
+pub mod consistent;
+pub mod diagnose;
+pub mod drawn;
+pub mod error;
+pub mod excitation;
+pub mod experiment;
+pub mod fit;
+pub mod gram;
+pub mod inertial;
+pub mod judge;
+mod known;
+pub mod layout;
+pub mod log;
+pub mod motion;
+mod offers;
+mod passive;
+pub mod physics;
+pub mod problem;
+pub mod regression;
+pub mod remaining_residual;
+pub mod rigid;
+pub mod search;
+pub mod sentences;
+pub mod soft;
+pub mod stated;
+pub mod system;
+pub mod usable;
+pub mod verdict;
+pub mod written;
+
+pub use error::ArmError;
