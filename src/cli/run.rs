@@ -1,8 +1,10 @@
 //! Options of `backdrive run`.
 
-use super::changes::{Changes, Clock};
+use super::changes::Changes;
 use super::network::{Network, Transport};
 use super::run_result::RunResult;
+use super::values::choices;
+use backdrive_nodes::stage::Clock;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -33,7 +35,10 @@ pub struct Run {
     #[allow(missing_docs)]
     pub network: Network,
     /// How time runs.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        ("lockstep", "As fast as the machine allows, and reproducible", Clock::Lockstep),
+        ("realtime", "With the wall clock", Clock::Realtime),
+    ]))]
     pub clock: Option<Clock>,
     /// Folder for the recordings of a graph with experiments.
     #[arg(long, value_name = "DIR")]
