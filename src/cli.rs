@@ -38,7 +38,6 @@ pub use graph::Graph;
 pub use init::Init;
 pub use inspect::Inspect;
 pub use model::{Model, ModelFile};
-pub use network::{Network, Transport};
 pub use node::{Node, SealedMaster};
 pub use prove::Prove;
 pub use replay::Replay;

@@ -2,7 +2,8 @@
 
 use backdrive_bags::BagError;
 use backdrive_inspect::InspectError;
-use backdrive_launch::LaunchError;
+use backdrive_launch::asked::AskedError;
+use backdrive_launch::{CarryError, LaunchError};
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
 use backdrive_sets::SetError;
@@ -124,6 +125,22 @@ impl From<FileError> for Failure {
 impl From<SetError> for Failure {
     fn from(error: SetError) -> Failure {
         Failure::input(error)
+    }
+}
+
+impl From<AskedError> for Failure {
+    fn from(error: AskedError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<CarryError> for Failure {
+    fn from(error: CarryError) -> Failure {
+        match error {
+            CarryError::Input(message) => Failure::input(message),
+            CarryError::Machine(message) => Failure::machine(message),
+            CarryError::Launch(error) => Failure::from(error),
+        }
     }
 }
 

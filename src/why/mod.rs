@@ -5,11 +5,11 @@ mod text;
 
 use crate::failure::{Failure, code};
 use crate::offered::Step;
-use crate::run::runs_from_its_bag;
 use crate::{cli, interrupt, output, progress};
 use backdrive_bags::Reader;
 use backdrive_nodes::graph::{Graph, Overrides};
 use backdrive_pages::why::page;
+use backdrive_runs::source::runs_from_its_bag;
 use backdrive_stability::by_itself::recorded::Recorded;
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
