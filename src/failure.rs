@@ -144,6 +144,18 @@ impl From<CarryError> for Failure {
     }
 }
 
+impl From<backdrive_stability::asked::AskedError> for Failure {
+    fn from(error: backdrive_stability::asked::AskedError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<backdrive_why::recording::RecordingError> for Failure {
+    fn from(error: backdrive_why::recording::RecordingError) -> Failure {
+        Failure::input(error)
+    }
+}
+
 impl From<SummaryError> for Failure {
     fn from(error: SummaryError) -> Failure {
         Failure::input(error)
