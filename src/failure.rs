@@ -6,6 +6,7 @@ use backdrive_launch::asked::AskedError;
 use backdrive_launch::{CarryError, LaunchError};
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
+use backdrive_predict::PredictError;
 use backdrive_sets::SetError;
 use backdrive_stability::summary::SummaryError;
 use std::fmt::Display;
@@ -153,6 +154,15 @@ impl From<backdrive_stability::asked::AskedError> for Failure {
 impl From<backdrive_why::recording::RecordingError> for Failure {
     fn from(error: backdrive_why::recording::RecordingError) -> Failure {
         Failure::input(error)
+    }
+}
+
+impl From<PredictError> for Failure {
+    fn from(error: PredictError) -> Failure {
+        match error {
+            PredictError::Input(message) => Failure::input(message),
+            PredictError::Usage(message) => Failure { code: code::USAGE, message },
+        }
     }
 }
 

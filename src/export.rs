@@ -1,7 +1,5 @@
 //! `backdrive export`: a model as another program's text, and what that leaves out.
 
-mod error_without;
-
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
@@ -9,8 +7,8 @@ use crate::output::may_replace;
 use crate::progress::busy;
 use backdrive_export::{Exported, LeftOut, Options};
 use backdrive_plant::model::Model;
+use backdrive_predict::left_out::{Errors, errors};
 use backdrive_report::percent;
-use error_without::{Errors, errors};
 use serde_json::{Value, json};
 
 /// Exports, and prints what is left out.
