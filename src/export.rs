@@ -5,7 +5,8 @@ use crate::failure::{Failure, code};
 use crate::output;
 use crate::output::may_replace;
 use crate::progress::busy;
-use backdrive_export::{Exported, LeftOut, Options};
+use backdrive_export::target::{Options, export as written};
+use backdrive_export::{Exported, LeftOut};
 use backdrive_plant::model::Model;
 use backdrive_predict::left_out::{Errors, errors};
 use backdrive_report::percent;
@@ -19,7 +20,7 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
     }
     let model = Model::load(&options.model)?;
     let how = Options { to: options.to, language: options.language, width: options.width, step: options.step };
-    let exported = backdrive_export::export(&model, &how).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
+    let exported = written(&model, &how).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
     let errors = match options.on.is_empty() {
         true => None,
         false => Some(busy("simulating the recordings without what is left out", || {

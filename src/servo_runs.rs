@@ -4,7 +4,6 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output::{self, may_replace};
 use crate::progress;
-use crate::simulate::written;
 use backdrive_pages::estimate::estimate;
 use backdrive_plant::model::Model;
 use backdrive_predict::servos::{JointError, ServoRuns};
@@ -24,7 +23,7 @@ pub fn simulate(asked: &cli::Simulate, options: &Options, model: &Model) -> Resu
         let (file, out) = (&run.file, &run.out);
         may_replace(out, asked.overwrite)?;
         let found = servos.predict(run)?;
-        written(&found.recording, out)?;
+        output::csv(&found.recording, out)?;
         let samples = found.recording.len();
         if !asked.json {
             output::line(format_args!("{file} -> {}: {samples} samples, free run from the commands", out.display()))?;

@@ -5,11 +5,9 @@ use crate::failure::Failure;
 use crate::output::{self, may_replace};
 use crate::progress::busy;
 use crate::servo_runs;
-use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_predict::held::held_model;
 use backdrive_predict::simulate::{Options, drives};
 use serde_json::json;
-use std::path::Path;
 
 /// Simulates, writes the predictions, and prints their difference from what was recorded.
 pub fn simulate(asked: &cli::Simulate) -> Result<u8, Failure> {
@@ -25,7 +23,7 @@ pub fn simulate(asked: &cli::Simulate) -> Result<u8, Failure> {
         let (name, out) = (&drive.recording.name, &drive.out);
         let found = busy(&format!("simulating {name}"), || drive.predict(&model, &options))?;
         found.notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
-        written(&found.recording, out)?;
+        output::csv(&found.recording, out)?;
         let (samples, period) = (found.recording.len(), found.recording.period);
         if !asked.json {
             output::line(format_args!("{name} -> {}: {samples} samples of {period:.6} s", out.display()))?;
@@ -40,14 +38,6 @@ pub fn simulate(asked: &cli::Simulate) -> Result<u8, Failure> {
         output::line(json!({ "model": model.name, "runs": results }))?;
     }
     Ok(0)
-}
-
-/// Writes a prediction as CSV.
-pub fn written(prediction: &Recording, out: &Path) -> Result<(), Failure> {
-    if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
-        output::folder(folder)?;
-    }
-    output::replace(out, |to| Ok(write_csv(prediction, to)?))
 }
 
 /// The options of the work.

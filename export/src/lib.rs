@@ -14,12 +14,11 @@ mod joint_terms;
 mod left_out;
 pub mod mjcf;
 mod names;
-mod target;
+pub mod target;
 pub mod urdf;
 mod xml;
 
 pub use left_out::{Change, LeftOut, Part, change_all};
-pub use target::{Options, Target, export};
 
 use backdrive_plant::model::Model;
 use std::fmt;

@@ -1,8 +1,8 @@
 //! Options of `backdrive export`.
 
 use super::values::{choices, positive};
-use backdrive_export::Target;
 use backdrive_export::feedforward::Language;
+use backdrive_export::target::Target;
 use clap::Args;
 use std::path::PathBuf;
 
