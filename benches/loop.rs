@@ -8,7 +8,7 @@
 
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Sensors, Settings};
 use backdrive_nodes::sequence::Sequence;
 use nix::time::{ClockId, clock_gettime};
 use std::path::Path;
@@ -18,7 +18,7 @@ const END_OF_PUSH_S: f64 = 3.0;
 
 fn graph(substeps: usize) -> Graph {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("launch/contact.toml");
-    let ideal = Overrides { sensors: Some("ideal".into()), ..Overrides::default() };
+    let ideal = Overrides { sensors: Some(Sensors::Ideal), ..Overrides::default() };
     let mut graph = Graph::load(&path, &ideal).expect("the contact graph is part of the workspace");
     for node in &mut graph.nodes {
         if let Settings::Master(files) | Settings::Canceller(files, ..) | Settings::Slave(files) = &mut node.settings {

@@ -12,7 +12,7 @@ use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Sensors};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::{Location, Transport};
@@ -38,7 +38,7 @@ fn at(path: &str) -> std::path::PathBuf {
 
 /// A step of the nonlinear loop of the contact task, in one thread with ideal sensors.
 fn step(count: usize) -> f64 {
-    let ideal = Overrides { sensors: Some("ideal".into()), ..Overrides::default() };
+    let ideal = Overrides { sensors: Some(Sensors::Ideal), ..Overrides::default() };
     let graph = Graph::load(&at("launch/contact.toml"), &ideal).expect("the contact graph is part of the workspace");
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(&graph, &n.name).expect("builds")).collect();
     let mut sequence = Sequence::new(plans, &graph.timing).expect("has no loop");

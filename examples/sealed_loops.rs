@@ -9,7 +9,7 @@
 use backdrive_bags::{Reader, Recorder};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_nodes::build::{plan, plan_with};
-use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides};
+use backdrive_nodes::graph::{Files, Graph, Limits, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Impairment;
 use backdrive_prove::hidden::{Hidden, Opened};
@@ -124,7 +124,7 @@ fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<Case
         environment: path(wall),
         high_pass_hz: Some(high_pass_hz),
         lambda: Some(1.0),
-        limits: Some(if index % 5 == 4 { "enforced" } else { "ignored" }.to_string()),
+        limits: Some(if index % 5 == 4 { Limits::Enforced } else { Limits::Ignored }),
         rate_hz: Some(rate),
         seed: Some(1 + index),
         ..Overrides::default()

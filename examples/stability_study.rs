@@ -18,7 +18,7 @@ use backdrive_bags::{Reader, Recorder, RecorderOptions};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_msgs::Message;
 use backdrive_nodes::build::plan;
-use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides};
+use backdrive_nodes::graph::{Files, Graph, Limits, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_plant::model::Model;
 use backdrive_stability::collect::Collector;
@@ -90,7 +90,7 @@ impl Configuration {
             environment: Some(path("environments", self.environment)),
             canceller: Some(canceller),
             canceller_grip: (self.canceller != "none" && !self.canceller.ends_with("second-order")).then(|| path("grips", "normal")),
-            limits: Some("ignored".into()),
+            limits: Some(Limits::Ignored),
             lambda: Some(lambda),
             ..Overrides::default()
         };

@@ -2,9 +2,11 @@
 
 use backdrive_bags::BagError;
 use backdrive_inspect::InspectError;
-use backdrive_launch::LaunchError;
+use backdrive_launch::asked::AskedError;
+use backdrive_launch::{CarryError, LaunchError};
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
+use backdrive_predict::PredictError;
 use backdrive_sets::SetError;
 use backdrive_stability::summary::SummaryError;
 use std::fmt::Display;
@@ -124,6 +126,43 @@ impl From<FileError> for Failure {
 impl From<SetError> for Failure {
     fn from(error: SetError) -> Failure {
         Failure::input(error)
+    }
+}
+
+impl From<AskedError> for Failure {
+    fn from(error: AskedError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<CarryError> for Failure {
+    fn from(error: CarryError) -> Failure {
+        match error {
+            CarryError::Input(message) => Failure::input(message),
+            CarryError::Machine(message) => Failure::machine(message),
+            CarryError::Launch(error) => Failure::from(error),
+        }
+    }
+}
+
+impl From<backdrive_stability::asked::AskedError> for Failure {
+    fn from(error: backdrive_stability::asked::AskedError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<backdrive_why::recording::RecordingError> for Failure {
+    fn from(error: backdrive_why::recording::RecordingError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<PredictError> for Failure {
+    fn from(error: PredictError) -> Failure {
+        match error {
+            PredictError::Input(message) => Failure::input(message),
+            PredictError::Usage(message) => Failure { code: code::USAGE, message },
+        }
     }
 }
 

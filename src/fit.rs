@@ -1,4 +1,4 @@
-//! `backdrive fit`: a model's parameters refitted to recordings, its structure unchanged.
+//! `backdrive fit`: a model's parameters refitted to recordings, its structure unchanged. The work is that of [`backdrive_predict::fit`].
 
 use crate::cli;
 use crate::columns::columns;
@@ -10,18 +10,10 @@ use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
 use crate::servo_runs;
-use backdrive_diagnosis::audit::without_contradicted;
-use backdrive_diagnosis::belief::compare::{Quality, predictions, qualities};
-use backdrive_diagnosis::belief::intervals::Uncertainty;
-use backdrive_diagnosis::belief::parameters::{Pair, Row, correlated, refitted_text, rows};
-use backdrive_diagnosis::belief::per_record::{PerRecord, fit_each};
-use backdrive_diagnosis::output_error::structure::{FreeParameter, Role, Structure};
-use backdrive_diagnosis::output_error::work::{Budget, Limit};
-use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::recordings::problem::Problem;
-use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_pages::parts::file_name;
 use backdrive_plant::model::Model;
+use backdrive_predict::fit::{Fit, Fitted, Options};
 use backdrive_report::{number, percent};
 use backdrive_sets::open;
 use serde_json::json;
@@ -29,21 +21,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
-
-/// Correlations from here on are named.
-const CORRELATED: f64 = 0.9;
-
-/// The result of a fit.
-struct Fitted {
-    rows: Vec<Row>,
-    pairs: Vec<Pair>,
-    given: Vec<Quality>,
-    fitted: Vec<Quality>,
-    per_record: PerRecord,
-    /// Names of the parameters that the recordings do not determine.
-    kept: Vec<String>,
-    model: String,
-}
 
 /// Fits, writes, and prints the confidence intervals of the parameters.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
@@ -58,32 +35,28 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         )));
     }
     let stop = interrupt::heard()?;
-    let opened = || open::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", opened)?;
+    let asked = Options {
+        model: options.model.clone(),
+        set: options.set.clone(),
+        grip: options.grip.clone(),
+        ignored: options.ignore_signal.clone(),
+        effort: options.effort,
+        patience: Duration::from_secs_f64(options.patience),
+    };
+    let fit = progress::busy("reading the recordings", || Fit::read(&asked))?;
     if let Some(out) = &options.out {
-        open::not_onto(out, &opened.files, options.overwrite)?;
+        open::not_onto(out, &fit.files, options.overwrite)?;
     }
-    for note in &opened.notes {
-        output::note(format_args!("note: {note}"));
-    }
-    let (problem, contradicted) = without_contradicted(opened.problem);
-    for remark in contradicted {
-        output::note(format_args!("note: {remark}"));
-    }
-    let patience = Duration::from_secs_f64(options.patience);
-    let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-    // With every effect withheld a search is the refit of the nominal model alone.
-    let settings = Settings { without, effort: options.effort, patience, ..Settings::default() };
-    let limit = settings.limit(Some(&stop));
-    let fitted = progress::about(settings.expected(), |report| fitted(&problem, &settings, limit, report))?;
+    fit.notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
+    let fitted = progress::about(fit.expected(), |report| fit.run(&stop, report))?;
     if let Some(out) = &options.out {
         output::file(out, &fitted.model)?;
     }
-    let steps = next(options, &opened.files, &fitted);
+    let steps = next(options, &fit.files, &fitted);
     let disagree = !fitted.per_record.disagreements().is_empty();
     if options.json {
         let all = json!({
-            "model": problem.model.name,
+            "model": fit.problem.model.name,
             "numbers": fitted.rows,
             "correlations": fitted.pairs,
             "given": fitted.given,
@@ -96,7 +69,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         });
         output::json(&all)?;
     } else {
-        output::line(text(&problem, &fitted))?;
+        output::line(text(&fit.problem, &fitted))?;
         to_do(&steps)?;
     }
     if let Some(out) = &options.out {
@@ -147,70 +120,6 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
     let asked = asked.option_writes("--out", Path::new("diagnosis")).build();
     steps.insert(if agree { steps.len() } else { 0 }, Step::new(text, [asked]));
     steps
-}
-
-/// How often parameters that the recordings do not determine are taken out and the rest is fitted again, at most.
-const ROUNDS: usize = 3;
-
-fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
-    let refit = |problem: &Problem| search(problem, settings, limit, report).map_err(Failure::input);
-    let Search { mut nominal, noise_sd, .. } = refit(problem)?;
-    report("fitting each record by itself");
-    let per_record = fit_each(problem, &nominal, &noise_sd, &Budget::new(settings.work(), limit));
-    let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &noise_sd);
-    // What the recordings do not determine keeps its nominal value, and the rest is fitted around it: written as fitted, such parameters
-    // would be arbitrary, and put back alone they would take the fit of the others along.
-    let (mut free, mut kept) = (problem.clone(), Vec::new());
-    let mut spread = Uncertainty::of(&nominal);
-    for _ in 0..ROUNDS {
-        let found = rows(&free, &nominal, &spread);
-        let loose = |(number, row): (&FreeParameter, &Row)| match number.role {
-            Role::Stated(i) if !row.determined => Some((i, row.clone())),
-            _ => None,
-        };
-        let loose: Vec<(usize, Row)> = nominal.structure.free.iter().zip(&found).filter_map(loose).collect();
-        if loose.is_empty() || loose.len() == free.stated.len() && free.stated.len() == nominal.structure.free.len() {
-            kept.extend(loose.into_iter().map(|l| l.1));
-            break;
-        }
-        let mut index = 0;
-        free.stated.retain(|_| {
-            index += 1;
-            !loose.iter().any(|(i, _)| i + 1 == index)
-        });
-        kept.extend(loose.into_iter().map(|l| l.1));
-        report("fitting what is determined");
-        nominal = refit(&free)?.nominal;
-        spread = Uncertainty::of(&nominal);
-    }
-    let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();
-    all.extend(kept.iter().map(|row| Row { value: row.given.unwrap_or(row.value), at_bound: false, moved_sd: None, ..row.clone() }));
-    all.sort_by_key(|row| problem.stated.iter().position(|s| row.name.starts_with(&s.path)).unwrap_or(usize::MAX));
-    // Edits name no kept parameter, so the kept ones remain unchanged in the text.
-    let model = match free.stated.iter().all(|s| kept.iter().any(|k| k.name == s.path)) {
-        true => problem.text.clone(),
-        false => refitted_text(&free, &nominal, &spread).map_err(Failure::input)?,
-    };
-    Ok(Fitted {
-        rows: all,
-        pairs: correlated(&free, &nominal, &spread, CORRELATED),
-        given,
-        fitted: quality(&free, &nominal.structure, &nominal.fit.values, &noise_sd),
-        per_record,
-        kept: kept.into_iter().map(|k| k.name).collect(),
-        model,
-    })
-}
-
-/// How well a structure with these values does on every recording.
-fn quality(problem: &Problem, structure: &Structure, values: &[f64], noise_sd: &[f64]) -> Vec<Quality> {
-    let of = |records: &[_], seen| {
-        predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, noise_sd, seen)).unwrap_or_default()
-    };
-    let mut all = of(&problem.fit, true);
-    all.extend(of(&problem.held_out, false));
-    all
 }
 
 /// A few tables for a person.

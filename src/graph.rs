@@ -3,8 +3,9 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
-use backdrive_nodes::build::{plan, topics};
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, draw as draw_graph};
+use backdrive_nodes::build::topics;
+use backdrive_nodes::graph::{Graph, Overrides, draw as draw_graph};
+use backdrive_runs::way::buildable;
 
 /// Loads a graph and every experiment of it, and builds every node, so that what would stop a run is reported now.
 pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
@@ -25,14 +26,6 @@ pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
         topics(&graph).len()
     ))?;
     Ok(0)
-}
-
-/// Whether every node of ours can be built: reported before a process is started, and once.
-pub fn buildable(graph: &Graph) -> Result<(), Failure> {
-    for node in graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && n.command.is_none()) {
-        plan(graph, &node.name).map_err(|e| Failure::input(format!("{}: {e}", graph.path.display())))?;
-    }
-    Ok(())
 }
 
 /// Draws a graph as text.

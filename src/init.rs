@@ -10,7 +10,7 @@ use backdrive_plant::recording::Recording;
 use backdrive_report::number;
 use backdrive_sets::init::ask::Asker;
 use backdrive_sets::init::estimate::Numbers;
-use backdrive_sets::init::options::{Attached, Driven, Motion, Options, Start};
+use backdrive_sets::init::options::Options;
 use backdrive_sets::init::plan::Plan;
 use backdrive_sets::init::{ESTIMATE, InitError, Prepared, Seen, prepare};
 use backdrive_sets::open::open;
@@ -98,15 +98,8 @@ fn resolved(asked: &cli::Init) -> Options {
         held_out: asked.held_out,
         columns: asked.columns,
         rate: asked.rate,
-        motion: asked.motion.map(|motion| match motion {
-            cli::Motion::Translation => Motion::Translation,
-            cli::Motion::Rotation => Motion::Rotation,
-        }),
-        driven: asked.driven.map(|driven| match driven {
-            cli::Driven::Force => Driven::Force,
-            cli::Driven::Current => Driven::Current,
-            cli::Driven::Motion => Driven::Motion,
-        }),
+        motion: asked.motion,
+        driven: asked.driven,
         drive: asked.drive,
         drive_unit: asked.drive_unit,
         constant: asked.constant,
@@ -120,18 +113,11 @@ fn resolved(asked: &cli::Init) -> Options {
         velocity_unit: asked.velocity_unit,
         force: asked.force,
         force_unit: asked.force_unit,
-        attached: asked.attached.map(|attached| match attached {
-            cli::Attached::Nothing => Attached::Nothing,
-            cli::Attached::Spring => Attached::Spring,
-            cli::Attached::Load => Attached::Load,
-        }),
+        attached: asked.attached,
         resonance: asked.resonance,
-        hand: asked.hand.map(|answer| answer == cli::Answer::Yes),
+        hand: asked.hand,
         inertia: asked.inertia,
-        start: asked.start.map(|start| match start {
-            cli::Start::Rest => Start::Rest,
-            cli::Start::Free => Start::Free,
-        }),
+        start: asked.start,
         yes: asked.yes,
         overwrite: asked.overwrite,
     }

@@ -13,7 +13,6 @@ mod compare;
 pub mod diagnose;
 mod diagnose_text;
 mod doctor;
-mod experiments;
 mod explain;
 mod export;
 pub mod failure;
@@ -23,11 +22,9 @@ mod init;
 mod inspect;
 mod interrupt;
 mod model;
-mod network;
 mod node;
 mod offered;
 pub mod output;
-mod play;
 mod progress;
 mod prove;
 mod replay;
@@ -39,8 +36,6 @@ mod simulate;
 mod stability;
 mod test_bench;
 mod why;
-
-pub use run::{Done, run_here};
 
 use cli::{Cli, Command};
 use std::process::ExitCode;

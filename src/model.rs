@@ -3,11 +3,11 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
-use crate::simulate::held_model;
 use backdrive_plant::describe::{Severity, check as remarks, describe};
 use backdrive_plant::linear::Operating;
 use backdrive_plant::parse::ModelFile;
 use backdrive_plant::stepper::{Options, Plant};
+use backdrive_predict::held::held_model;
 
 /// Does what `backdrive model` is asked.
 pub fn model(command: &cli::Model) -> Result<u8, Failure> {

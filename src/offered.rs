@@ -6,7 +6,7 @@
 
 use crate::caller;
 use crate::cli::Cli;
-pub use backdrive_bags::shell_word;
+use backdrive_bags::{free, shell_word};
 pub use backdrive_pages::offered::{Offered, Step};
 use clap::Parser;
 use std::ffi::OsString;
@@ -173,18 +173,6 @@ pub fn shown(path: &Path) -> PathBuf {
         Some(below) => below,
         None => path.to_path_buf(),
     }
-}
-
-/// A file name that is not taken: the given one, or `NAME-2.EXT`, `NAME-3.EXT`, ...
-pub fn free(path: &Path) -> PathBuf {
-    let taken = |path: &Path| path.symlink_metadata().is_ok();
-    if !taken(path) {
-        return path.to_path_buf();
-    }
-    let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let ending = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
-    let numbered = (2_u32..).map(|number| path.with_file_name(format!("{stem}-{number}{ending}")));
-    numbered.into_iter().find(|path| !taken(path)).unwrap_or_else(|| path.to_path_buf())
 }
 
 #[cfg(test)]

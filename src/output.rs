@@ -10,6 +10,7 @@ use crate::caller;
 use crate::failure::{Failure, code};
 use crate::offered::own_command;
 use backdrive_bags::move_into_place;
+use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_report::Page;
 use clap::Parser;
 use std::fmt::Display;
@@ -122,6 +123,14 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 /// When it cannot be written; then what was there is there still, and nothing new.
 pub fn file(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     replace(path, |beside| std::fs::write(beside, contents).map_err(|e| Failure::write(beside, e)))
+}
+
+/// A recording as CSV, in place of a file that is there.
+///
+/// # Errors
+/// As [`file()`].
+pub fn csv(recording: &Recording, path: &Path) -> Result<(), Failure> {
+    replace(path, |beside| Ok(write_csv(recording, beside)?))
 }
 
 /// A page, with the command and the version that made it at its foot.

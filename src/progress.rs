@@ -2,7 +2,10 @@
 
 use crate::caller::{self, Progress};
 use crate::output;
+use backdrive_runs::Watch;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::any::Any;
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -72,8 +75,35 @@ pub fn busy<T>(title: &str, work: impl FnOnce() -> T) -> T {
     work()
 }
 
+/// What a terminal hears of a run.
+#[derive(Default)]
+pub struct Terminal(RefCell<Option<ProgressBar>>);
+
+impl Watch for Terminal {
+    fn note(&self, sentence: &str) {
+        match &*self.0.borrow() {
+            Some(bar) => bar.suspend(|| output::note(sentence)),
+            None => output::note(sentence),
+        }
+    }
+
+    fn begins(&self, doing: &str) -> Box<dyn Any> {
+        Box::new(Busy::begin(doing))
+    }
+
+    fn steps(&self, title: &str, done: u64, all: u64) {
+        let bar = self.0.take().unwrap_or_else(|| steps(all, title));
+        bar.set_position(done);
+        if done < all {
+            self.0.replace(Some(bar));
+        } else {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 /// A bar that counts steps.
-pub fn steps(total: u64, title: &str) -> ProgressBar {
+fn steps(total: u64, title: &str) -> ProgressBar {
     let bar = ProgressBar::new(total);
     if let Ok(style) = ProgressStyle::with_template("{msg:28!} {wide_bar} {pos} of {len} steps, {rate}, {eta} left") {
         let rate = |state: &ProgressState, out: &mut dyn Write| {

@@ -7,7 +7,7 @@ use backdrive_pages::prove::page;
 use backdrive_prove::case::Case;
 use backdrive_prove::headline::Headline;
 use backdrive_prove::summary::Summary;
-use backdrive_prove::{Nominal, Operator, Options, Proof, ProveError, Watch, hidden};
+use backdrive_prove::{Options, Proof, ProveError, Watch, hidden};
 use std::any::Any;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -56,16 +56,8 @@ fn resolved(asked: &cli::Prove) -> Result<Options, Failure> {
         high_pass_hz: asked.high_pass,
         effort: asked.effort,
         patience_s: asked.patience,
-        operator: match asked.operator {
-            cli::Operator::Shown => Operator::Shown,
-            cli::Operator::Hidden => Operator::Hidden,
-            cli::Operator::Half => Operator::Half,
-        },
-        nominal: match asked.nominal {
-            cli::Nominal::Given => Nominal::Given,
-            cli::Nominal::Refitted => Nominal::Refitted,
-            cli::Nominal::Half => Nominal::Half,
-        },
+        operator: asked.operator,
+        nominal: asked.nominal,
         hand_bandwidth_hz: asked.hand_bandwidth,
         grips: (!asked.same_grip).then_some(asked.grips),
         live: !asked.no_live,

@@ -6,101 +6,40 @@ use crate::output::{self, may_replace};
 use crate::progress;
 use backdrive_pages::estimate::estimate;
 use backdrive_plant::model::Model;
-use backdrive_plant::recording::{Recording, write_csv};
-use backdrive_plant::servo::Numbers;
-use backdrive_plant::set::RecordingSet;
+use backdrive_predict::servos::{JointError, ServoRuns};
+use backdrive_predict::simulate::Options;
 use backdrive_report::number;
 use backdrive_servo::problem::Problem;
 use backdrive_servo::refit::{Refitted, refit};
-use backdrive_servo::run::free_runs;
-use backdrive_servo::search::scored;
 use backdrive_sets::open;
-use backdrive_signal::statistics::deviation;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-
-/// The parameters that the model states of each joint of the problem.
-fn stated(problem: &Problem) -> Vec<Option<Numbers>> {
-    problem.joints.iter().map(|j| j.given).collect()
-}
+use std::path::PathBuf;
 
 /// Runs the joints from the commands of recordings, writes their positions, and prints their difference from the recorded ones.
-pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
-    let path = PathBuf::from(&options.drive);
-    let (mut set, _) = open::set_of(std::slice::from_ref(&path))?;
-    if let Some(columns) = &options.columns {
-        let other = RecordingSet::open(columns)?;
-        (set.columns, set.joints) = (other.columns, other.joints);
-    }
-    let problem =
-        progress::busy(&format!("reading {}", options.drive), || Problem::open(&set, Some(&options.model))).map_err(Failure::input)?;
-    if stated(&problem).iter().all(Option::is_none) {
-        let names: Vec<&str> = model.servos.iter().map(|s| s.joint.as_str()).collect();
-        return Err(Failure::input(format!(
-            "{}: holds no joint that {} has a [servo] of; it has {}",
-            options.drive,
-            options.model.display(),
-            names.join(", ")
-        )));
-    }
-    let is_file = path.is_file()
-        && path.file_name().is_some_and(|n| n != "set.toml")
-        && path.extension().is_some_and(|e| !e.eq_ignore_ascii_case("toml"));
+pub fn simulate(asked: &cli::Simulate, options: &Options, model: &Model) -> Result<u8, Failure> {
+    let servos = progress::busy(&format!("reading {}", asked.drive), || ServoRuns::read(options, &asked.model, model))?;
     let mut runs = Vec::new();
-    for (held_out, files) in [(false, &set.fit), (true, &set.held_out)] {
-        for (index, file) in files.iter().enumerate() {
-            let out = if is_file {
-                options.out.clone()
-            } else {
-                options.out.join(Path::new(backdrive_pages::parts::file_name(file)).with_extension("csv"))
-            };
-            may_replace(&out, options.overwrite)?;
-            let positions = free_runs(&problem, &stated(&problem), held_out, index).map_err(Failure::input)?;
-            runs.push(written(&problem, &positions, held_out, index, file, &out, options)?);
+    for run in &servos.runs {
+        let (file, out) = (&run.file, &run.out);
+        may_replace(out, asked.overwrite)?;
+        let found = servos.predict(run)?;
+        output::csv(&found.recording, out)?;
+        let samples = found.recording.len();
+        if !asked.json {
+            output::line(format_args!("{file} -> {}: {samples} samples, free run from the commands", out.display()))?;
+            for joint in &found.joints {
+                let nrmse = joint.nrmse.map_or("-".to_string(), |s| format!("{s:.4}"));
+                output::line(format_args!("  {:<24} nrmse {nrmse}, mean error {} mrad", joint.joint, number(1e3 * joint.mean_rad)))?;
+            }
         }
+        let error = |j: &JointError| (j.joint.clone(), json!({ "nrmse": j.nrmse, "mean_error_rad": j.mean_rad }));
+        let joints: serde_json::Map<_, _> = found.joints.iter().map(error).collect();
+        runs.push(json!({ "recording": file, "out": out, "samples": samples, "joints": joints }));
     }
-    if options.json {
+    if asked.json {
         output::line(json!({ "model": model.name, "runs": runs }))?;
     }
     Ok(0)
-}
-
-fn written(
-    problem: &Problem,
-    positions: &[Vec<f64>],
-    held_out: bool,
-    index: usize,
-    file: &str,
-    out: &Path,
-    options: &cli::Simulate,
-) -> Result<serde_json::Value, Failure> {
-    let mut signals = Vec::new();
-    let mut errors = serde_json::Map::new();
-    let mut lines = Vec::new();
-    let mut times = Vec::new();
-    for (joint, simulated) in problem.joints.iter().zip(positions).filter(|(j, _)| j.given.is_some()) {
-        let record = if held_out { &joint.held_out[index] } else { &joint.fit[index] };
-        times.clone_from(&record.t);
-        signals.push((format!("{}.command", joint.name), record.command.clone()));
-        signals.push((format!("{}.position", joint.name), simulated.clone()));
-        let (share, absolute) = scored(simulated, &record.position);
-        // A joint that rests has no nrmse.
-        let share = (deviation(&record.position) > 1e-6).then_some(share);
-        let told = share.map_or("-".to_string(), |s| format!("{s:.4}"));
-        lines.push(format!("  {:<24} nrmse {told}, mean error {} mrad", joint.name, number(1e3 * absolute)));
-        errors.insert(joint.name.clone(), json!({ "nrmse": share, "mean_error_rad": absolute }));
-    }
-    let samples = times.len();
-    let recording = Recording::new(file, times, signals).map_err(Failure::input)?;
-    if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
-        output::folder(folder)?;
-    }
-    output::replace(out, |to| Ok(write_csv(&recording, to)?))?;
-    if !options.json {
-        output::line(format_args!("{file} -> {}: {samples} samples, free run from the commands", out.display()))?;
-        lines.iter().try_for_each(output::line)?;
-    }
-    Ok(json!({ "recording": file, "out": out, "samples": samples, "joints": errors }))
 }
 
 /// Refits the parameters that the model states of each joint, its structure unchanged.

@@ -4,17 +4,12 @@ use crate::cli;
 use crate::columns::columns;
 use crate::failure::Failure;
 use crate::output;
-use backdrive_control::engine::Ripple;
-use backdrive_nodes::graph::bench::{EngineFile, dynamometer_to_toml};
-use backdrive_plant::model::Model;
 use backdrive_report::number;
+use backdrive_testbench::files::files;
 use backdrive_testbench::lag::Observation;
 use backdrive_testbench::{Asked, BenchError, Identified, Record, Validation, identify, validate};
 use serde_json::{Value, json};
 use std::path::Path;
-
-/// The shaft that is written: its structure.
-const SHAFT: &str = include_str!("../plant/models/engine-test-bench.toml");
 
 /// Identifies, writes what a graph takes, and prints the parameters.
 pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
@@ -27,7 +22,10 @@ pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
         (Some(dragged), Some(cycle)) => Some(validate(&found.bench, &asked.observation, &record(dragged)?, &record(cycle)?).map_err(bad)?),
         _ => None,
     };
-    write(&options.out, &found)?;
+    output::folder(&options.out)?;
+    for (name, text) in files(&found).map_err(Failure::machine)? {
+        output::file(&options.out.join(name), text)?;
+    }
     if options.json {
         output::json(&as_json(&asked, &found, validation.as_ref()))?;
     } else {
@@ -50,28 +48,6 @@ fn asked(options: &cli::TestBench, steps: &Record) -> Asked {
         lag_points: [options.pedals.iter().map(|percent| 0.01 * percent).collect(), speeds],
         observation: Observation { noise: [options.noise; 2], force_rate: options.torque_rate, back_off: options.back_off },
     }
-}
-
-fn write(out: &Path, found: &Identified) -> Result<(), Failure> {
-    output::folder(out)?;
-    let put = |name: &str, text: String| output::file(&out.join(name), text);
-    // Combustion's ripple is above what the observer passes on.
-    let engine = EngineFile { engine: found.bench.engine.clone(), ripple: Ripple { per_revolution: 0.0, share: 0.0 } };
-    put("engine.toml", engine.to_toml("Engine, identified"))?;
-    put("dynamometer.toml", dynamometer_to_toml(&found.bench.dynamometer, "Dynamometer, identified"))?;
-    let mut shaft = Model::from_toml(SHAFT, "the shaft").map_err(Failure::machine)?;
-    let numbers = &found.bench.shaft;
-    (shaft.name, shaft.title) = ("engine-test-bench-identified".to_string(), "Combustion engine test bench, identified".to_string());
-    shaft.source = "identified by backdrive test-bench".to_string();
-    for (path, number) in [
-        ("bodies.engine", numbers.engine),
-        ("bodies.dyno", numbers.dynamometer),
-        ("elements.shaft.stiffness", numbers.stiffness),
-        ("elements.shaft_damping.damping", numbers.damping),
-    ] {
-        shaft.set_values_at(path, &[number]).map_err(Failure::machine)?;
-    }
-    put("shaft.toml", shaft.to_toml())
 }
 
 /// Name, unit, value, standard error.

@@ -81,5 +81,5 @@ pub use signals::{Alignment, Signal, Signals, signals};
 pub use table::{
     ColumnMap, ImportOptions, ImportReport, Quantity, TableFormat, columns_of, export_csv, export_table, import_csv, import_table, topic_of,
 };
-pub use whole::move_into_place;
+pub use whole::{free, move_into_place};
 pub use without::without;

@@ -63,6 +63,18 @@ impl Whole {
     }
 }
 
+/// A file name that is not taken: the given one, or `NAME-2.EXT`, `NAME-3.EXT`, ...
+pub fn free(path: &Path) -> PathBuf {
+    let taken = |path: &Path| path.symlink_metadata().is_ok();
+    if !taken(path) {
+        return path.to_path_buf();
+    }
+    let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let ending = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    let numbered = (2_u32..).map(|number| path.with_file_name(format!("{stem}-{number}{ending}")));
+    numbered.into_iter().find(|path| !taken(path)).unwrap_or_else(|| path.to_path_buf())
+}
+
 /// Moves a file that is complete to its place, over one that is there, whose permissions it takes over. It is on the disk before it has its
 /// name: what the disk refuses late it refuses here, and the file of before is still there.
 ///

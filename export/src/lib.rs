@@ -14,6 +14,7 @@ mod joint_terms;
 mod left_out;
 pub mod mjcf;
 mod names;
+pub mod target;
 pub mod urdf;
 mod xml;
 

@@ -7,6 +7,7 @@
 //! - `supervise`: starting and ending a run; `watch`: what happens between
 //! - `domain_claim`: which run of a machine speaks in a ROS domain; `session`: who a run is on the network; `secret`: what its hosts share
 //! - `hosts`: a run on several hosts starts together; `place`: where its nodes meet
+//! - `asked`: from options and the environment to where a run meets; `bridge`: a local run seen over ROS 2; `play`: a bag sent again
 //! - `status`, `screen`: what a person sees meanwhile
 //! - `report`: what is known afterwards
 //!
@@ -17,6 +18,9 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod asked;
+pub mod bridge;
+mod carry_error;
 mod child;
 pub mod doctor;
 mod domain_claim;
@@ -30,6 +34,7 @@ mod pace;
 mod paths;
 mod place;
 mod plan;
+pub mod play;
 mod proc_stat;
 mod remains;
 mod report;
@@ -45,6 +50,7 @@ mod sweep;
 mod tell;
 mod watch;
 
+pub use carry_error::CarryError;
 pub use error::LaunchError;
 pub use hosts::Begun;
 pub use options::{Command, OnDeath, SuperviseOptions};

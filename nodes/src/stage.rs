@@ -19,6 +19,16 @@ pub enum Clock {
     Realtime,
 }
 
+impl Clock {
+    /// Each with its word in a graph file.
+    pub const ALL: [(&'static str, Clock); 2] = [("lockstep", Clock::Lockstep), ("realtime", Clock::Realtime)];
+
+    /// Its word in a graph file.
+    pub fn word(self) -> &'static str {
+        Clock::ALL[self as usize].0
+    }
+}
+
 /// What is done to a connection on purpose, to see what the loop makes of it. Seeded, and applied at the receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Impairment {

@@ -10,10 +10,10 @@ use backdrive_msgs::{Message, Status};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::stage::Clock;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, si};
+use backdrive_runs::Done;
 use backdrive_stability::collect::Collector;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::session::{AxisSignals, Session};
-use backdrive_stability::summary::Summary;
 use std::path::Path;
 
 /// Events beyond these are counted, not listed.
@@ -98,26 +98,8 @@ impl Heard {
     }
 }
 
-/// What a run gave, for its page.
-pub struct Shown<'a> {
-    /// Steps done by the node that did most.
-    pub steps: u64,
-    /// Wall-clock time, s.
-    pub duration_s: f64,
-    /// From the supervisor; `None` for a run in one process.
-    pub report: Option<&'a RunReport>,
-    /// Messages that are not in the bag, and samples that a node did not get.
-    pub lost: u64,
-    /// The bag, if one was recorded.
-    pub bag: Option<&'a Path>,
-    /// Whether its recorder ended and nothing is missing in it.
-    pub complete: bool,
-    /// What happened.
-    pub summary: Option<&'a Summary>,
-}
-
 /// The page of a run or of a replay, with what to do next.
-pub fn page(done: &Shown, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
+pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
@@ -141,14 +123,17 @@ pub fn page(done: &Shown, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page 
 }
 
 /// What a hurried reader takes away.
-fn headline(done: &Shown) -> (Tone, String) {
-    let gain = done.summary.map_or(String::new(), |s| format!(" at μλ = {}", number(s.last_loop_gain)));
-    let fault =
-        done.report.filter(|r| !matches!(r.cause, Cause::Completed)).map(|r| format!(" The run did not go to its end: {}.", r.cause));
+fn headline(done: &Done) -> (Tone, String) {
+    let gain = done.summary.as_ref().map_or(String::new(), |s| format!(" at μλ = {}", number(s.last_loop_gain)));
+    let fault = done
+        .report
+        .as_ref()
+        .filter(|r| !matches!(r.cause, Cause::Completed))
+        .map(|r| format!(" The run did not go to its end: {}.", r.cause));
     let fault = fault.or((done.lost > 0).then(|| format!(" {} messages were lost.", done.lost))).unwrap_or_default();
-    let Some(outcome) = done.summary.and_then(|s| s.outcome) else {
+    let Some(outcome) = done.summary.as_ref().and_then(|s| s.outcome) else {
         let tone = if fault.is_empty() { Tone::Neutral } else { Tone::Bad };
-        let why = done.summary.and_then(|s| s.no_loop).map_or(String::new(), |why| format!(": {why}"));
+        let why = done.summary.as_ref().and_then(|s| s.no_loop).map_or(String::new(), |why| format!(": {why}"));
         return (tone, format!("There is no loop whose stability could be judged{why}.{fault}"));
     };
     let (tone, text) = match outcome {
@@ -174,13 +159,13 @@ fn headline(done: &Shown) -> (Tone, String) {
     (tone, format!("{text}{fault}"))
 }
 
-fn facts(done: &Shown, graph: &Graph) -> Table {
+fn facts(done: &Done, graph: &Graph) -> Table {
     let mut table = Table::new(["", ""]);
     let mut row = |name: &str, text: String| table.push([name.to_string(), text]);
     let clock = if graph.timing.clock == Clock::Realtime { "real time" } else { "lockstep" };
     let planned = graph.timing.steps.map_or(String::new(), |n| format!(" of {n}"));
     row("steps", format!("{}{planned}, at {} ({clock})", done.steps, si(graph.timing.rate_hz, "Hz")));
-    if let Some(s) = done.summary {
+    if let Some(s) = &done.summary {
         let later = if (s.last_loop_gain - s.loop_gain).abs() > 1e-9 {
             format!("; {} at the end", number(s.last_loop_gain))
         } else {
@@ -202,7 +187,7 @@ fn facts(done: &Shown, graph: &Graph) -> Table {
             row("margin in contact", margin.clone());
         }
     }
-    if let Some(bag) = done.bag {
+    if let Some(bag) = &done.bag {
         let state = if done.complete { "complete".to_string() } else { format!("not complete, {} messages lost", done.lost) };
         row("bag", format!("{} ({state})", bag.file_name().unwrap_or_default().to_string_lossy()));
     }
@@ -270,8 +255,8 @@ fn plots(axis: &AxisSignals, period_s: f64, title: &str, touching: &[(f64, f64)]
     Figure::stacked([position, force])
 }
 
-fn timing(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
-    let Some(report) = done.report else {
+fn timing(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
+    let Some(report) = &done.report else {
         page.text(&format!(
             "All nodes ran in one process, in lockstep: {} steps in {}. Nothing waits for a deadline there and nothing can be lost between nodes.",
             done.steps,
@@ -326,7 +311,7 @@ fn latency(page: &mut Page, graph: &Graph, heard: &Heard) {
     }
 }
 
-fn events(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
+fn events(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
     let severity = |severity: u32| match severity {
         0 => Cell::from("info".to_string()),
         1 => Cell::tone("warning", Tone::Warning),
@@ -340,7 +325,7 @@ fn events(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
         let own = report.events.iter().filter(|e| e.step.is_none());
         own.map(|e| (e.t_s.unwrap_or(0.0), e.node.clone(), e.severity, e.text.clone())).collect()
     };
-    rows.extend(done.report.map(supervised).unwrap_or_default());
+    rows.extend(done.report.as_ref().map(supervised).unwrap_or_default());
     if rows.is_empty() {
         page.text("None.");
         return;
@@ -350,7 +335,7 @@ fn events(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
         table.push([Cell::from(si(time, "s")), node.into(), severity(how), text.into()]);
     }
     page.table(table);
-    let left_out = heard.events_left_out as u64 + done.report.map_or(0, |r| r.events_left_out);
+    let left_out = heard.events_left_out as u64 + done.report.as_ref().map_or(0, |r| r.events_left_out);
     if left_out > 0 {
         page.note(&format!("{left_out} more events are in the bag."));
     }

@@ -2,7 +2,7 @@
 
 use super::hidden::Opened;
 use crate::error::ProveError;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_nodes::graph::{Graph, Hand, Limits, NodeKind, Overrides, Settings};
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
 use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario};
 use std::path::{Path, PathBuf};
@@ -69,9 +69,9 @@ impl Loop<'_> {
             canceller_grip: Some(canceller.grip.clone().unwrap_or_else(none)),
             // Who estimates the hand has a rule of its own for what cannot be known at rest.
             high_pass_hz: Some(if canceller.estimates_hand { 0.0 } else { self.high_pass_hz }),
-            hand: canceller.estimates_hand.then(|| "estimated".to_string()),
+            hand: canceller.estimates_hand.then_some(Hand::Estimated),
             edge_without: canceller.edge_without,
-            limits: Some("ignored".to_string()),
+            limits: Some(Limits::Ignored),
             ..Overrides::default()
         }
     }

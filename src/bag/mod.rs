@@ -5,6 +5,7 @@ mod import;
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use crate::output;
 use crate::progress::busy;
 use backdrive_bags::{DiffOptions, Reader, check, check_target, diff, info, merge, recover};
@@ -18,9 +19,21 @@ pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
         cli::Bag::Export(asked) => export::export(asked),
         cli::Bag::Recover { damaged, bag, overwrite } => save(damaged, bag, *overwrite),
         cli::Bag::Merge { a, b, bag, overwrite, offset, json } => join([a, b], bag, *overwrite, *offset, *json),
-        cli::Bag::Play { bag, speed } => crate::play::play(bag, *speed),
+        cli::Bag::Play { bag, speed } => play(bag, *speed),
         cli::Bag::Diff { a, b, tolerance, ignore, json } => compare(a, b, tolerance, ignore, *json),
     }
+}
+
+/// Publishes a bag's messages over shared memory until its end or Ctrl-C.
+fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
+    if !(speed.is_finite() && speed > 0.0) {
+        return Err(Failure { code: code::USAGE, message: format!("--speed must be above 0, is {speed}") });
+    }
+    let stop = interrupt::heard()?;
+    let played = || backdrive_launch::play::play(bag, speed, &stop, &|told| output::note(told));
+    let report = busy(&format!("playing {}", bag.display()), played)?;
+    output::line(format_args!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3))?;
+    Ok(if report.finished { 0 } else { code::INTERRUPTED })
 }
 
 fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {

@@ -1,8 +1,9 @@
 //! Changes to a graph, which several verbs take.
 
-use super::values::{law, not_negative, positive, rate};
-use backdrive_nodes::graph::Overrides;
-use clap::{Args, ValueEnum};
+use super::values::{choices, law, not_negative, positive, rate};
+use backdrive_nodes::graph::{Hand, Limits, Overrides, Sensors};
+use backdrive_nodes::stage::Clock;
+use clap::Args;
 use std::path::PathBuf;
 
 /// SwappedParts of a graph that are swapped.
@@ -34,17 +35,17 @@ pub struct SwappedParts {
     pub high_pass: Option<f64>,
     /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md. Over several
     /// axes an estimate needs --edge-without.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([("as-modelled", "As its grip says", Hand::AsModelled), ("estimated", "Estimated", Hand::Estimated)]))]
     pub hand: Option<Hand>,
     /// Gain product from which on the loop shakes without a canceller, whichever hand holds (`backdrive stability` says it): a canceller that estimates the hand
     /// then cancels no more than the gain needs.
     #[arg(long, value_name = "MU_LAMBDA", value_parser = positive, allow_negative_numbers = true)]
     pub edge_without: Option<f64>,
     /// Whether sensors round and are noisy as the model files say.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([("as-modelled", "As the model files say", Sensors::AsModelled), ("ideal", "Exact", Sensors::Ideal)]))]
     pub sensors: Option<Sensors>,
     /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([("enforced", "As the model files say", Limits::Enforced), ("ignored", "None act", Limits::Ignored)]))]
     pub limits: Option<Limits>,
 }
 
@@ -59,10 +60,10 @@ impl SwappedParts {
         words.file("--canceller", self.canceller.as_ref());
         words.file("--canceller-grip", self.canceller_grip.as_ref());
         words.value("--high-pass", self.high_pass);
-        words.value("--hand", self.hand.and_then(|hand| Some(hand.to_possible_value()?.get_name().to_string())));
+        words.value("--hand", self.hand.map(|choice| choice.word().replace('_', "-")));
         words.value("--edge-without", self.edge_without);
-        words.value("--sensors", self.sensors.and_then(|sensors| Some(sensors.to_possible_value()?.get_name().to_string())));
-        words.value("--limits", self.limits.and_then(|limits| Some(limits.to_possible_value()?.get_name().to_string())));
+        words.value("--sensors", self.sensors.map(|choice| choice.word().replace('_', "-")));
+        words.value("--limits", self.limits.map(|choice| choice.word().replace('_', "-")));
         words.0
     }
 
@@ -76,10 +77,10 @@ impl SwappedParts {
             canceller: self.canceller.clone(),
             canceller_grip: self.canceller_grip.clone(),
             high_pass_hz: self.high_pass,
-            hand: self.hand.map(|h| h.word().to_string()),
+            hand: self.hand,
             edge_without: self.edge_without,
-            sensors: self.sensors.map(|s| s.word().to_string()),
-            limits: self.limits.map(|l| l.word().to_string()),
+            sensors: self.sensors,
+            limits: self.limits,
             ..Overrides::default()
         }
     }
@@ -100,63 +101,6 @@ impl Words {
     /// The same of a file.
     fn file(&mut self, name: &str, path: Option<&PathBuf>) {
         self.value(name, path.map(|path| path.display()));
-    }
-}
-
-/// See [`SwappedParts::hand`].
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Hand {
-    /// As its grip says.
-    AsModelled,
-    /// Estimated.
-    Estimated,
-}
-
-impl Hand {
-    /// Its word in a graph file.
-    fn word(self) -> &'static str {
-        match self {
-            Hand::AsModelled => "as_modelled",
-            Hand::Estimated => "estimated",
-        }
-    }
-}
-
-/// See [`SwappedParts::sensors`].
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Sensors {
-    /// As the model files say.
-    AsModelled,
-    /// Exact.
-    Ideal,
-}
-
-impl Sensors {
-    /// Its word in a graph file.
-    fn word(self) -> &'static str {
-        match self {
-            Sensors::AsModelled => "as_modelled",
-            Sensors::Ideal => "ideal",
-        }
-    }
-}
-
-/// See [`SwappedParts::limits`].
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Limits {
-    /// As the model files say.
-    Enforced,
-    /// None act.
-    Ignored,
-}
-
-impl Limits {
-    /// Its word in a graph file.
-    fn word(self) -> &'static str {
-        match self {
-            Limits::Enforced => "enforced",
-            Limits::Ignored => "ignored",
-        }
     }
 }
 
@@ -224,30 +168,11 @@ impl Changes {
             overwrite: self.overwrite,
             record_origin: self.record_origin,
             poll: self.poll,
-            clock: clock.map(|c| c.word().to_string()),
+            clock,
             rate_hz: self.rate,
             duration_s: self.duration,
             seed: self.seed,
             ..self.parts.overrides()
-        }
-    }
-}
-
-/// How time runs.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum Clock {
-    /// As fast as the machine allows, and reproducible.
-    Lockstep,
-    /// With the wall clock.
-    Realtime,
-}
-
-impl Clock {
-    /// Its word in a graph file.
-    fn word(self) -> &'static str {
-        match self {
-            Clock::Lockstep => "lockstep",
-            Clock::Realtime => "realtime",
         }
     }
 }

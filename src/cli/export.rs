@@ -1,7 +1,9 @@
 //! Options of `backdrive export`.
 
-use super::values::positive;
-use clap::{Args, ValueEnum};
+use super::values::{choices, positive};
+use backdrive_export::feedforward::Language;
+use backdrive_export::target::Target;
+use clap::Args;
 use std::path::PathBuf;
 
 /// Examples and exit codes.
@@ -16,41 +18,25 @@ error on the held-out recordings with it and without.
 Exit codes: 0 exported whole, 1 exported without what is listed, 2 usage, 3 the model or a recording is wrong, or there is nothing to export,
 5 a file cannot be written.";
 
-/// What a model is written as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Target {
-    /// MuJoCo 4.0.
-    Mjcf,
-    /// Joints of a robot: dynamics and limits.
-    Urdf,
-    /// Joints of a robot for Isaac Lab 2.3 on Isaac Sim 5.
-    Isaac,
-    /// Friction as a function of position, velocity and load, for a controller.
-    Feedforward,
-}
-
-/// What a feed-forward is written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum Language {
-    /// C99.
-    #[default]
-    C,
-    /// Python 3.
-    Python,
-    /// Numbers and equations.
-    Yaml,
-}
-
 /// `backdrive export`
 #[derive(Debug, Args)]
 pub struct Export {
     /// The model file: a network of one axis, or a model with a [robot].
     pub model: PathBuf,
     /// For what.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        (Target::Mjcf.word(), "MuJoCo 4.0", Target::Mjcf),
+        (Target::Urdf.word(), "Joints of a robot: dynamics and limits", Target::Urdf),
+        (Target::Isaac.word(), "Joints of a robot for Isaac Lab 2.3 on Isaac Sim 5", Target::Isaac),
+        (Target::Feedforward.word(), "Friction as a function of position, velocity and load, for a controller", Target::Feedforward),
+    ]))]
     pub to: Target,
     /// Of a feed-forward: what it is written in.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "c", value_parser = choices([
+        ("c", "C99", Language::C),
+        ("python", "Python 3", Language::Python),
+        ("yaml", "Numbers and equations", Language::Yaml),
+    ]))]
     pub language: Language,
     /// Of a feed-forward: width w of the smooth sign tanh(v/w), m/s or rad/s; without this 1 mm/s or 10 mrad/s, and less where friction falls within less.
     #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]

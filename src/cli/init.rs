@@ -1,7 +1,8 @@
 //! Options of `backdrive init`: every question that it asks has one.
 
-use super::values::positive;
-use clap::{Args, ValueEnum};
+use super::values::{choices, positive};
+use backdrive_sets::init::options::{Attached, Driven, Motion, Start};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Examples and exit codes.
@@ -40,10 +41,14 @@ pub struct Init {
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Whether it moves along a line or turns.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([("translation", "Along a line: m, kg, N", Motion::Translation), ("rotation", "It turns: rad, kg m², N m", Motion::Rotation)]))]
     pub motion: Option<Motion>,
     /// What is prescribed and recorded: a force (a torque), a motor's current, or a motion whose reaction force is measured.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        ("force|torque", "A force or a torque", Driven::Force),
+        ("current", "A motor's current", Driven::Current),
+        ("motion", "A prescribed motion", Driven::Motion),
+    ]))]
     pub driven: Option<Driven>,
     /// The column of it.
     #[arg(long, value_name = "COLUMN")]
@@ -85,19 +90,23 @@ pub struct Init {
     #[arg(long, value_name = "UNIT")]
     pub force_unit: Option<String>,
     /// What the driven body holds on to: nothing, a spring to the frame (a specimen, a return spring), or a load behind a joint that yields.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        ("nothing", "Nothing but its own mass and bearing", Attached::Nothing),
+        ("spring", "A spring to the frame", Attached::Spring),
+        ("load", "A second body behind a joint that yields", Attached::Load),
+    ]))]
     pub attached: Option<Attached>,
     /// Roughly where a load rings against the motor, Hz.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub resonance: Option<f64>,
     /// A hand that nobody measured holds the device: it becomes a slow curve that is found with the rest.
-    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "yes")]
-    pub hand: Option<Answer>,
+    #[arg(long, num_args = 0..=1, default_missing_value = "yes", value_parser = choices([("yes", "Yes", true), ("no", "No", false)]))]
+    pub hand: Option<bool>,
     /// The moving mass, kg, or inertia, kg m^2; without this an estimate from the recordings.
     #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
     /// How each recording begins. Without this what the samples show.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([("rest", "At rest at the first sample", Start::Rest), ("free", "In any state", Start::Free)]))]
     pub start: Option<Start>,
     /// Take the default of every question that no option answers.
     #[arg(long)]
@@ -108,54 +117,4 @@ pub struct Init {
     /// Print what was written and found as JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// See [`Init::motion`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Motion {
-    /// Along a line: m, kg, N.
-    Translation,
-    /// It turns: rad, kg m², N m.
-    Rotation,
-}
-
-/// See [`Init::driven`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Driven {
-    /// A force or a torque.
-    #[value(alias = "torque")]
-    Force,
-    /// A motor's current.
-    Current,
-    /// A prescribed motion.
-    Motion,
-}
-
-/// See [`Init::attached`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Attached {
-    /// Nothing but its own mass and bearing.
-    Nothing,
-    /// A spring to the frame.
-    Spring,
-    /// A second body behind a joint that yields.
-    Load,
-}
-
-/// See [`Init::start`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Start {
-    /// At rest at the first sample.
-    Rest,
-    /// In any state.
-    Free,
-}
-
-/// Yes or no.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Answer {
-    /// Yes.
-    Yes,
-    /// No.
-    No,
 }

@@ -1,17 +1,7 @@
 //! How messages travel, and where on the network.
 
-use clap::{Args, ValueEnum};
-
-/// How messages travel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Transport {
-    /// A process per node over shared memory.
-    Iceoryx2,
-    /// A process per node over ROS 2 (DDS).
-    Ros2,
-    /// All nodes in this process.
-    Inproc,
-}
+use backdrive_launch::asked::Asked;
+use clap::Args;
 
 /// Where on the network ROS 2 is spoken.
 #[derive(Debug, Clone, Default, Args)]
@@ -25,4 +15,11 @@ pub struct Network {
     /// Address (IPv4) or name of a host to tell by unicast, where there is no multicast; may be given again.
     #[arg(long, value_name = "HOST")]
     pub peer: Vec<String>,
+}
+
+impl Network {
+    /// As the run takes it.
+    pub fn asked(&self) -> Asked {
+        Asked { domain: self.domain, interfaces: self.interface.clone(), peers: self.peer.clone() }
+    }
 }

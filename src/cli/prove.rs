@@ -1,7 +1,8 @@
 //! Options of `backdrive prove`.
 
-use super::values::{patience, positive};
-use clap::{Args, ValueEnum};
+use super::values::{choices, patience, positive};
+use backdrive_prove::{Nominal, Operator};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Examples and exit codes.
@@ -63,10 +64,18 @@ pub struct Prove {
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience())]
     pub patience: f64,
     /// Whether the bags hold what the hand wants: in a real session nobody measures it.
-    #[arg(long, value_name = "WHICH", value_enum, default_value_t = Operator::Half)]
+    #[arg(long, value_name = "WHICH", default_value = "half", value_parser = choices([
+        ("shown", "None", Operator::Shown),
+        ("hidden", "All", Operator::Hidden),
+        ("half", "Every second one", Operator::Half),
+    ]))]
     pub operator: Operator,
     /// Whether the nominal numbers were refitted to a session before: they have then taken on what they can of what is concealed.
-    #[arg(long, value_name = "WHICH", value_enum, default_value_t = Nominal::Half)]
+    #[arg(long, value_name = "WHICH", default_value = "half", value_parser = choices([
+        ("given", "None: its numbers are off as they were drawn", Nominal::Given),
+        ("refitted", "All", Nominal::Refitted),
+        ("half", "Two of every four", Nominal::Half),
+    ]))]
     pub nominal: Nominal,
     /// Hz, up to which a hand moves that nobody measured.
     #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 5.0)]
@@ -89,28 +98,6 @@ pub struct Prove {
     /// The program of the hidden plant; without this `backdrive-sealed` beside this program, or on the path.
     #[arg(long, value_name = "FILE")]
     pub plant: Option<PathBuf>,
-}
-
-/// Which cases hide what the hand wants.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Operator {
-    /// None.
-    Shown,
-    /// All.
-    Hidden,
-    /// Every second one.
-    Half,
-}
-
-/// Which cases have a nominal model that was refitted to the hidden plant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Nominal {
-    /// None: its numbers are off as they were drawn.
-    Given,
-    /// All.
-    Refitted,
-    /// Two of every four.
-    Half,
 }
 
 fn at_most_three(text: &str) -> Result<usize, String> {

@@ -1,8 +1,11 @@
 //! Options of `backdrive run`.
 
-use super::changes::{Changes, Clock};
-use super::network::{Network, Transport};
+use super::changes::Changes;
+use super::network::Network;
 use super::run_result::RunResult;
+use super::values::choices;
+use backdrive_nodes::stage::Clock;
+use backdrive_runs::way::Transport;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -21,7 +24,11 @@ pub struct Run {
     /// The graph file; or a bag, whose graph is run with the files and options of the recorded run.
     pub graph: PathBuf,
     /// How messages travel: shared memory without --host, else ROS 2.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        ("iceoryx2", "A process per node over shared memory", Transport::Iceoryx2),
+        ("ros2", "A process per node over ROS 2 (DDS)", Transport::Ros2),
+        ("inproc", "All nodes in this process", Transport::Inproc),
+    ]))]
     pub transport: Option<Transport>,
     /// Run only the nodes of this host of the graph, together with the other hosts.
     #[arg(long, value_name = "NAME")]
@@ -33,7 +40,10 @@ pub struct Run {
     #[allow(missing_docs)]
     pub network: Network,
     /// How time runs.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choices([
+        ("lockstep", "As fast as the machine allows, and reproducible", Clock::Lockstep),
+        ("realtime", "With the wall clock", Clock::Realtime),
+    ]))]
     pub clock: Option<Clock>,
     /// Folder for the recordings of a graph with experiments.
     #[arg(long, value_name = "DIR")]

@@ -3,7 +3,7 @@
 use backdrive_control::coupling::Law;
 use backdrive_nodes::graph::MAX_RATE_HZ;
 use backdrive_stability::compare::Rival;
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// s, how long a search may take on the clock where nothing else is said: the library's own.
 pub fn patience() -> f64 {
@@ -23,6 +23,21 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be above 0".to_string()) })
+}
+
+/// Values of an option: the word (and, behind a bar, another for it), what its help says of it, and what it means.
+pub fn choices<T: Clone + Send + Sync + 'static, const N: usize>(
+    all: [(&'static str, &'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let values = all.each_ref().map(|(words, about, _)| {
+        let mut words = words.split('|');
+        PossibleValue::new(words.next().unwrap_or_default()).help(*about).aliases(words)
+    });
+    let meaning = move |given: String| {
+        let found = all.iter().find(|(words, ..)| words.split('|').any(|word| word == given));
+        found.map(|(.., value)| value.clone()).ok_or("is none of them")
+    };
+    PossibleValuesParser::new(values).try_map(meaning)
 }
 
 /// A law of a coupling.

@@ -1,21 +1,21 @@
 //! `backdrive compare`: the same session through each law between master and slave, and through the canceller.
 
-mod loaded;
 mod text;
 
 use crate::failure::{Failure, code};
 use crate::{cli, interrupt, output, progress};
+use backdrive_nodes::graph::Overrides;
 use backdrive_pages::compare::compared::Compared;
 use backdrive_pages::compare::page;
-use backdrive_stability::compare::Cell;
-use loaded::Loaded;
+use backdrive_stability::compare::asked::{Asked, Options};
+use backdrive_stability::compare::{Cell, Condition, Varied};
 use serde_json::json;
 use std::sync::atomic::Ordering;
 
 /// Compares.
 pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
-    let loaded = progress::busy(&format!("reading {}", options.session.display()), || Loaded::read(options))?;
+    let loaded = progress::busy(&format!("reading {}", options.session.display()), || Asked::read(&resolved(options)))?;
     if let Some(html) = &options.html {
         output::writable(html)?;
     }
@@ -58,4 +58,25 @@ pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
         return Err(Failure { code: code::INTERRUPTED, message });
     }
     Ok(0)
+}
+
+/// The options of the work.
+fn resolved(options: &cli::Compare) -> Options {
+    Options {
+        session: options.session.clone(),
+        laws: options.laws.clone(),
+        changes: Overrides { lambda: options.lambda, ..options.parts.overrides() },
+        conditions: conditions(options),
+    }
+}
+
+fn conditions(options: &cli::Compare) -> Vec<Condition> {
+    let ms = |ms: f64| 1e-3 * ms;
+    let at = Condition::delay(ms(options.at));
+    let delays = options.delays.iter().map(|d| Condition::delay(ms(*d)));
+    let jitter = options.jitter.iter().filter_map(|j| j.0);
+    let jitter = jitter.map(|[mean, most]| Condition { varied: Varied::Jitter, jitter_s: ms(most), ..Condition::delay(ms(mean)) });
+    let loss = options.loss.iter().filter_map(|l| l.0).map(|loss| Condition { varied: Varied::Loss, loss, ..at.clone() });
+    let grips = options.grips.iter().filter(|g| **g != 1.0).map(|g| Condition { varied: Varied::Grip, grip_scale: *g, ..at.clone() });
+    delays.chain(jitter).chain(loss).chain(grips).collect()
 }

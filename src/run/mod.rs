@@ -1,20 +1,22 @@
 //! `backdrive run` and `backdrive clean`.
 
-mod done;
 mod next;
-mod source;
-mod way;
+mod text;
 
-pub use done::Done;
 pub use next::next;
-pub use source::runs_from_its_bag;
-pub use way::{Way, repeat_here, run_graph, run_here};
+pub use text::tell;
 
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
+use crate::progress::Terminal;
 use backdrive_launch::RunHome;
+use backdrive_launch::asked::Meeting;
+use backdrive_nodes::graph::{Graph, Overrides};
 use backdrive_pages::run::{Heard, page};
+use backdrive_runs::way::{Way, run_graph, run_here};
+use backdrive_runs::{experiments, source};
+use serde_json::json;
 use std::time::Duration;
 
 /// Runs a graph, or each experiment of one.
@@ -24,9 +26,10 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     if options.host.is_none() {
         graph = graph.on_one_host();
     }
-    let way = Way::of(&graph, options)?;
+    let (host, secret) = (options.host.clone(), options.secret.clone());
+    let way = Way::of(&graph, options.transport, Meeting { wire: None, host, secret, network: options.network.asked() })?;
     if !graph.experiments.is_empty() {
-        return crate::experiments::run(options, &way, &graph, &changes);
+        return each_experiment(options, &way, &graph, &changes);
     }
     if options.out.is_some() {
         return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
@@ -35,17 +38,46 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         output::writable(html)?;
     }
     let mut heard = Heard::of(&graph);
+    let terminal = Terminal::default();
     let done = match &way {
         // What goes by is all there is where no bag is recorded.
-        Way::Here if options.result.html.is_some() => run_here(&graph, &mut |topic, message| heard.take(topic, message))?,
-        Way::Here | Way::Processes(_) => run_graph(&graph, &way)?,
+        Way::Here if options.result.html.is_some() => run_here(&graph, &terminal, &mut |topic, message| heard.take(topic, message))?,
+        Way::Here | Way::Processes(_) => run_graph(&graph, &way, &terminal)?,
     };
     if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.result.html.is_some()) {
         heard = Heard::from_bag(&graph, bag).map_err(Failure::input)?;
     }
     let steps = next(&done, &graph, None);
-    let page = options.result.html.as_deref().map(|html| (html, page(&done.shown(), &graph, &heard, &steps)));
-    done.tell(page, options.result.json, &steps)
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    tell(&done, page, options.result.json, &steps)
+}
+
+/// Runs every experiment of a graph and writes one set of recordings, or one for each step of a protocol: a folder with a bag for each experiment,
+/// `set.toml` and the model of the device that was recorded.
+fn each_experiment(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) -> Result<u8, Failure> {
+    if options.result.html.is_some() {
+        return Err(Failure::input(format!("{}: has several experiments, and --html is the page of one run", options.graph.display())));
+    }
+    if options.changes.bag.is_some() {
+        return Err(Failure::input(format!("{}: has several experiments; name their folder with --out", options.graph.display())));
+    }
+    let asked = experiments::Options { file: &options.graph, changes, way, out: options.out.as_deref() };
+    let sets = experiments::run(graph, &asked, &Terminal::default())?;
+    for set in &sets {
+        for (name, text) in set.texts() {
+            output::file(&set.folder.join(name), text)?;
+        }
+    }
+    if options.result.json {
+        let sets: Vec<_> = sets.iter().map(|s| json!({ "set": s.folder, "fit": s.fit, "held_out": s.held_out })).collect();
+        output::line(json!({ "sets": sets }))?;
+    } else {
+        for set in &sets {
+            let (file, fit, held_out) = (set.folder.join("set.toml"), set.fit.len(), set.held_out.len());
+            output::line(format_args!("{}: {fit} recordings to fit, {held_out} held out", file.display()))?;
+        }
+    }
+    Ok(0)
 }
 
 /// Removes what dead runs left.

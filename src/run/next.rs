@@ -1,9 +1,10 @@
 //! What to do after a run or a replay, with the commands that do it.
 
-use super::done::Done;
-use crate::offered::{Builder, Offered, Step, free, plain, recover};
+use crate::offered::{Builder, Offered, Step, plain, recover};
+use backdrive_bags::free;
 use backdrive_nodes::graph::Graph;
 use backdrive_report::number;
+use backdrive_runs::Done;
 use backdrive_stability::outcome::Outcome;
 use std::path::{Path, PathBuf};
 

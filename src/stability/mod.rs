@@ -1,18 +1,18 @@
 //! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the stability limit.
 
 mod curve;
-mod loaded;
 mod next;
 mod text;
 
 use crate::failure::{Failure, code};
-use crate::offered::{Step, lines};
+use crate::offered::{Step, lines, with_recover};
 use crate::{cli, interrupt, output, progress};
+use backdrive_nodes::graph::Overrides;
 use backdrive_pages::stability::{self as pages, Point};
+use backdrive_stability::asked::{Asked, Options, curve};
 use backdrive_stability::resimulate::ResimulateError;
 use backdrive_stability::verdict::{Answer, AnswerError, Word, answer};
-use curve::{curve, curve_text, point_json};
-use loaded::Loaded;
+use curve::{curve_text, point_json};
 use next::next;
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
@@ -22,14 +22,25 @@ use text::text;
 pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
 
-    let loaded = progress::busy(&format!("reading {}", options.recording.display()), || Loaded::read(options))?;
-    let question = loaded.question(options)?;
+    let how = resolved(options);
+    let mut asked = progress::busy(&format!("reading {}", options.recording.display()), || Asked::read(&how))?;
+    if asked.is_cut {
+        asked.session.notes.push(with_recover("the bag was not closed: what it holds is used", &options.recording));
+    }
+    let question = asked.question(&how)?;
     if let Some(html) = &options.html {
         // A report that cannot be written is reported before the work, not after it.
         output::writable(html)?;
     }
     let curve = match &options.sweep {
-        Some(gains) => Some(curve(&question, &gains.0, &cancel)?),
+        Some(gains) => {
+            let bar = progress::work();
+            bar.set_message("sweep");
+            bar.set_length(gains.0.len() as u64);
+            let done = curve(&question, &gains.0, &|done| bar.set_position(done as u64), &cancel);
+            bar.finish_and_clear();
+            Some(done?)
+        }
         None => None,
     };
     let bar = progress::work();
@@ -40,7 +51,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     };
     let found = answer(&question, &hear, &cancel);
     bar.finish_and_clear();
-    let steps = found.as_ref().map_or_else(|_| Vec::new(), |found| next(found, options, loaded.asked.as_ref()));
+    let steps = found.as_ref().map_or_else(|_| Vec::new(), |found| next(found, options, asked.graph.as_ref()));
     let found = match found {
         Ok(found) => Some(found),
         // What was done until then is printed.
@@ -81,4 +92,18 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
         Word::CannotTell => code::CANNOT_TELL,
         Word::LimitCycle | Word::Unstable | Word::Limited => code::NEGATIVE,
     })
+}
+
+/// The options of the work.
+fn resolved(asked: &cli::Stability) -> Options {
+    Options {
+        recording: asked.recording.clone(),
+        roles: asked.roles.clone(),
+        changes: Overrides { coupling: asked.coupling.clone(), ..asked.parts.overrides() },
+        gain: asked.gain,
+        mu: asked.mu,
+        lambda: asked.lambda,
+        script: asked.script.clone(),
+        grips: asked.grips.clone(),
+    }
 }

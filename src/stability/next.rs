@@ -1,11 +1,12 @@
 //! What to do after an answer about stability, with the commands that do it.
 
 use crate::cli;
-use crate::offered::{Builder, Offered, Step, free, plain};
-use crate::run::runs_from_its_bag;
+use crate::offered::{Builder, Offered, Step, plain};
+use backdrive_bags::free;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_pages::stability::spelled;
 use backdrive_report::{number, percent};
+use backdrive_runs::source::runs_from_its_bag;
 use backdrive_stability::verdict::{Answer, Word};
 use std::path::Path;
 

@@ -1,7 +1,8 @@
 //! What to do after an answer: the remedies that stop the loop, each with the commands that try it.
 
 use crate::cli::{Cli, Command};
-use crate::offered::{Builder, Offered, Step, free};
+use crate::offered::{Builder, Offered, Step};
+use backdrive_bags::free;
 use backdrive_nodes::graph::Overrides;
 use backdrive_pages::parts::large;
 use backdrive_report::percent;

@@ -5,7 +5,7 @@
 //!     cargo run --release -p backdrive-stability --example hand_edges [GRAPH [GRIP...]]
 
 use backdrive_control::hand::HandSettings;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_nodes::graph::{Graph, Limits, NodeKind, Overrides, Sensors, Settings};
 use backdrive_stability::resimulate::edge::{Search, edge};
 use backdrive_stability::resimulate::{RunOptions, Scenario};
 use std::path::{Path, PathBuf};
@@ -43,8 +43,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn stable_to(file: &Path, canceller: &str, edge_without: Option<f64>, grip: f64) -> Result<(f64, String), Box<dyn std::error::Error>> {
     let changes = Overrides {
         canceller: (canceller == "none").then(|| "none".into()),
-        limits: Some("ignored".into()),
-        sensors: std::env::var("IDEAL").ok().map(|_| "ideal".into()),
+        limits: Some(Limits::Ignored),
+        sensors: std::env::var("IDEAL").ok().map(|_| Sensors::Ideal),
         ..Overrides::default()
     };
     let mut graph = Graph::load(file, &changes)?;

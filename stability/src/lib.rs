@@ -3,6 +3,7 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod asked;
 pub mod bag_gate;
 mod bag_rows;
 pub mod by_itself;

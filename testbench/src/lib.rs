@@ -5,6 +5,7 @@
 //! and from it the engine's lag. A [`Bench`] simulates itself; [`validate`] gives the correlations that the paper validates with.
 
 mod dynamometer;
+pub mod files;
 mod fit;
 mod identify;
 pub mod lag;

@@ -4,7 +4,7 @@
 
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_nodes::graph::{Graph, Limits, NodeKind, Overrides, Sensors, Settings};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_plant::linear::{LinearModel, Operating};
 use backdrive_stability::judgement::judge;
@@ -18,7 +18,7 @@ pub fn file(path: &str) -> PathBuf {
 
 /// The contact graph with noise-free sensors and no limits, changed as given.
 pub fn contact(changes: Overrides) -> Graph {
-    let changes = Overrides { sensors: Some("ideal".into()), limits: Some("ignored".into()), ..changes };
+    let changes = Overrides { sensors: Some(Sensors::Ideal), limits: Some(Limits::Ignored), ..changes };
     Graph::load(&file("launch/contact.toml"), &changes).unwrap()
 }
 

@@ -18,6 +18,7 @@ pub mod happening;
 mod named;
 mod numbers;
 pub mod options;
+pub mod recording;
 pub mod remedy;
 mod stated;
 pub mod throw;

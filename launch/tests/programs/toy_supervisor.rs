@@ -20,7 +20,7 @@ fn main() -> Outcome<ExitCode> {
             let changes = Overrides {
                 bag: Some(PathBuf::from(bag)),
                 duration_s: Some(seconds.parse()?),
-                clock: Some(clock.to_string()),
+                clock: Clock::ALL.into_iter().find(|(word, _)| word == clock).map(|(_, clock)| clock),
                 ..Overrides::default()
             };
             (home, Plan::of(&Graph::load(Path::new(file), &changes)?, &Place::default()))

@@ -5,6 +5,7 @@
 
 pub mod bench;
 mod check;
+mod choices;
 mod controller;
 pub mod coupling;
 mod draw;
@@ -19,6 +20,7 @@ mod together;
 mod types;
 
 pub use check::step_order;
+pub use choices::{Hand, Limits, Sensors};
 pub use draw::draw;
 pub use files::Files;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};

@@ -1,9 +1,11 @@
 //! What the command line changes in a graph file, without touching the file.
 
+use super::choices::{Hand, Limits, Sensors};
 use super::files::Files;
 use super::recorded::Recorded;
 use super::swap::put_coupling;
 use super::{Graph, NodeKind};
+use crate::stage::Clock;
 use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value, value};
@@ -25,8 +27,8 @@ pub struct Overrides {
     pub canceller_grip: Option<PathBuf>,
     /// Corner of the canceller's high-pass, Hz.
     pub high_pass_hz: Option<f64>,
-    /// Whether the canceller uses the hand of its grip file (`as_modelled`) or estimates it (`estimated`).
-    pub hand: Option<String>,
+    /// Whether the canceller uses the hand of its grip file or estimates it.
+    pub hand: Option<Hand>,
     /// Of a canceller that estimates the hand: the lowest gain product at which the loop oscillates without a canceller.
     pub edge_without: Option<f64>,
     /// Position scale.
@@ -43,8 +45,8 @@ pub struct Overrides {
     pub bag: Option<PathBuf>,
     /// Whether a bag that exists may be replaced; stands in no text, for it is about this run alone.
     pub overwrite: bool,
-    /// `lockstep` or `realtime`.
-    pub clock: Option<String>,
+    /// How time passes.
+    pub clock: Option<Clock>,
     /// Steps per second.
     pub rate_hz: Option<f64>,
     /// Length of the run, s.
@@ -55,10 +57,10 @@ pub struct Overrides {
     pub poll: bool,
     /// Seed of everything random.
     pub seed: Option<u64>,
-    /// Whether sensors round and are noisy as the model files say (`as_modelled`) or not (`ideal`).
-    pub sensors: Option<String>,
-    /// Whether the devices' limits act (`enforced`) or not (`ignored`).
-    pub limits: Option<String>,
+    /// Whether sensors round and are noisy as the model files say.
+    pub sensors: Option<Sensors>,
+    /// Whether the devices' limits act.
+    pub limits: Option<Limits>,
 }
 
 /// Keys of node tables that name files.
@@ -112,8 +114,8 @@ impl Overrides {
         if let Some(duration) = self.duration_s {
             doc["duration_s"] = value(duration);
         }
-        if let Some(clock) = &self.clock {
-            doc["clock"] = value(clock.as_str());
+        if let Some(clock) = self.clock {
+            doc["clock"] = value(clock.word());
         }
         if self.record_origin {
             doc["record_origin"] = value(true);
@@ -136,6 +138,7 @@ impl Overrides {
         let of_master = OfMaster { grip: of_master.grip || of_master.model && self.canceller_grip.is_none(), ..of_master };
         let canceller = self.canceller.as_ref().filter(|_| !of_master.model).map(file);
         let canceller_grip = self.canceller_grip.as_ref().filter(|_| !of_master.grip).map(file);
+        let (sensors, limits) = (self.sensors.map(|s| value(s.word())), self.limits.map(|l| value(l.word())));
         let wanted: [(&str, NodeKind, &str, Option<Item>); 17] = [
             ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
             ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
@@ -144,16 +147,16 @@ impl Overrides {
             ("--canceller", NodeKind::Canceller, "model", canceller),
             ("--canceller-grip", NodeKind::Canceller, "grip", canceller_grip),
             ("--high-pass", NodeKind::Canceller, "high_pass_hz", self.high_pass_hz.map(value)),
-            ("--hand", NodeKind::Canceller, "hand", self.hand.as_deref().map(value)),
+            ("--hand", NodeKind::Canceller, "hand", self.hand.map(|hand| value(hand.word()))),
             ("--edge-without", NodeKind::Canceller, "edge_without", self.edge_without.map(value)),
             ("--dither", NodeKind::Scaling, "dither", self.dither.as_deref().map(value)),
             ("--guard", NodeKind::Scaling, "guard", self.guard.map(value)),
             ("--bag", NodeKind::Recorder, "bag", self.bag.as_ref().map(file)),
-            ("--sensors", NodeKind::Master, "sensors", self.sensors.as_deref().map(value)),
-            ("--sensors", NodeKind::Slave, "sensors", self.sensors.as_deref().map(value)),
-            ("--sensors", NodeKind::Rig, "sensors", self.sensors.as_deref().map(value)),
-            ("--limits", NodeKind::Master, "limits", self.limits.as_deref().map(value)),
-            ("--limits", NodeKind::Slave, "limits", self.limits.as_deref().map(value)),
+            ("--sensors", NodeKind::Master, "sensors", sensors.clone()),
+            ("--sensors", NodeKind::Slave, "sensors", sensors.clone()),
+            ("--sensors", NodeKind::Rig, "sensors", sensors.clone()),
+            ("--limits", NodeKind::Master, "limits", limits.clone()),
+            ("--limits", NodeKind::Slave, "limits", limits.clone()),
         ];
         for (option, kind, key, item) in wanted {
             let Some(item) = item else { continue };

@@ -1,6 +1,7 @@
 //! The same hand and the same environment with alternatives to the canceller: stability limit, transparency, tracking and effort of each, over link
 //! conditions.
 
+pub mod asked;
 mod condition;
 mod measures;
 mod rival;

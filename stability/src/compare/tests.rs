@@ -1,7 +1,6 @@
 use super::*;
 use crate::session::{AxisSignals, Session};
-use backdrive_nodes::graph::Overrides;
-use backdrive_nodes::graph::{NodeKind, Settings};
+use backdrive_nodes::graph::{Limits, NodeKind, Overrides, Settings};
 use std::path::Path;
 
 const WALL: f64 = 1000.0;
@@ -95,7 +94,7 @@ fn a_canceller_that_subtracts_nothing_gets_to_know_the_master() {
 fn a_comparison_ranks_what_is_known() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     // Without the motor's limit of force, which a canceller reaches before it oscillates.
-    let limits = Some("ignored".into());
+    let limits = Some(Limits::Ignored);
     let changes = Overrides { coupling: Some("direct".into()), limits, duration_s: Some(2.0), ..Overrides::default() };
     let of = |rival: Rival| {
         let mut graph = Graph::load(&root.join("launch/coupling.toml"), &changes).unwrap();

@@ -3,7 +3,7 @@
 use super::eigenloci::{Matrix, alone, encirclements};
 use super::{Limit, coupled_loops, limit};
 use crate::resimulate::{Gain, RunOptions, Scenario};
-use backdrive_nodes::graph::{Graph, Overrides};
+use backdrive_nodes::graph::{Graph, Limits, Overrides, Sensors};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -158,8 +158,8 @@ fn sensor_turned(degrees: f64) -> Graph {
     std::fs::write(&path, text).unwrap();
     let changes = Overrides {
         canceller: Some("none".into()),
-        sensors: Some("ideal".into()),
-        limits: Some("ignored".into()),
+        sensors: Some(Sensors::Ideal),
+        limits: Some(Limits::Ignored),
         duration_s: Some(1.5),
         ..Overrides::default()
     };

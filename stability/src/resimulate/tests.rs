@@ -8,7 +8,7 @@ use super::sweep::{log_grid, sweep};
 use super::*;
 use crate::outcome::Outcome;
 use backdrive_control::operator::Intent;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_nodes::graph::{Graph, Hand, Limits, NodeKind, Overrides, Sensors, Settings};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -24,7 +24,7 @@ fn graph(path: &str, changes: Overrides) -> Graph {
 
 /// Ideal sensors, no limits.
 fn ideal(changes: Overrides) -> Overrides {
-    Overrides { sensors: Some("ideal".into()), limits: Some("ignored".into()), ..changes }
+    Overrides { sensors: Some(Sensors::Ideal), limits: Some(Limits::Ignored), ..changes }
 }
 
 /// The linear loop of `tests/common`: linear master with the normal grip, a wall that pushes and pulls, a small bump of the hand.
@@ -132,7 +132,7 @@ fn an_exact_copy_has_no_edge() {
 #[test]
 fn a_force_clamp_comes_before_any_oscillation() {
     // The full canceller: nothing oscillates, but the motor's 8.9 N are reached.
-    let graph = graph("launch/contact.toml", Overrides { sensors: Some("ideal".into()), ..Overrides::default() });
+    let graph = graph("launch/contact.toml", Overrides { sensors: Some(Sensors::Ideal), ..Overrides::default() });
     let found = find(&Scenario::new(graph, None, None).unwrap(), &coarse(0.2, 20.0));
     assert_eq!(found.critical_gain, None, "{}", found.reason);
     let limited = found.limited_from.unwrap();
@@ -264,7 +264,7 @@ fn firmer_hands_are_answered_for() {
 #[test]
 fn the_recovered_hand_moves_the_master_as_recorded_and_gives_the_same_edge() {
     let graph =
-        graph("launch/contact.toml", Overrides { canceller: Some("none".into()), limits: Some("ignored".into()), ..Overrides::default() });
+        graph("launch/contact.toml", Overrides { canceller: Some("none".into()), limits: Some(Limits::Ignored), ..Overrides::default() });
     let scenario = Scenario::new(graph.clone(), None, None).unwrap();
     let run = scenario.run(scenario.own_gain(), &RunOptions { keep_signals: true, ..RunOptions::default() }, &NEVER).unwrap();
     let mut session = run.signals.unwrap();
@@ -314,8 +314,8 @@ fn another_graph_s_operator_is_a_script() {
 }
 
 /// The contact script with the exact model in the canceller, its hand as modelled or estimated, no limits.
-fn with_hand(path: &str, hand: &str, canceller: Option<&str>) -> Scenario {
-    let (hand, limits) = (Some(hand.to_string()), Some("ignored".into()));
+fn with_hand(path: &str, hand: Hand, canceller: Option<&str>) -> Scenario {
+    let (hand, limits) = (Some(hand), Some(Limits::Ignored));
     Scenario::new(graph(path, Overrides { hand, limits, canceller: canceller.map(Into::into), ..Overrides::default() }), None, None)
         .unwrap()
 }
@@ -331,8 +331,8 @@ fn with_the_hand_estimated_five_times_the_gain_without_a_canceller_is_stable_who
     let grips: &[f64] = if long { &[0.5, 1.1, 2.0] } else { &[1.1] };
     let gains: &[f64] = if long { &[0.1, 0.5, 1.5, 2.7, 5.0, 14.0] } else { &[0.5, 14.0] };
     for (path, grips) in [("launch/contact.toml", grips), ("launch/contact-regrip.toml", &[1.0])] {
-        let [none, fixed, estimated] =
-            [("as_modelled", Some("none")), ("as_modelled", None), ("estimated", None)].map(|(hand, model)| with_hand(path, hand, model));
+        let [none, fixed, estimated] = [(Hand::AsModelled, Some("none")), (Hand::AsModelled, None), (Hand::Estimated, None)]
+            .map(|(hand, model)| with_hand(path, hand, model));
         for grip in grips {
             // No canceller bears 2.72 at most, with the softest hand.
             assert!(outcome(&none, *grip, 2.9) != Outcome::Stable, "{path}, {grip}");

@@ -41,7 +41,7 @@ pub fn run(context: &Context) -> Result<Vec<Reported>, StudyError> {
         let bag = if bag.is_absolute() { bag } else { std::env::current_dir().unwrap_or_default().join(bag) };
         let changes = Overrides { master: Some(file(master)), bag: Some(bag.clone()), ..Overrides::default() };
         let graph = Graph::load(&file("launch/user-force.toml"), &changes)?;
-        backdrive::run_here(&graph, &mut |_, _| {})?;
+        backdrive_runs::way::run_here(&graph, &backdrive_runs::Silent, &mut |_, _| {})?;
         let reader = Reader::open(&bag).map_err(failed)?;
         let wanted = [Signal::new("truth", "/master/user_js", "effort[0]"), Signal::new("estimate", "/observer/filtered_js", "effort[0]")];
         let found = signals(&reader, &wanted).map_err(failed)?;

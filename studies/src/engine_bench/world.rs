@@ -109,7 +109,7 @@ impl World {
         let bag = self.folder.join(format!("{experiment}.mcap"));
         let changes = Overrides { bag: Some(bag.clone()), ..Overrides::default() };
         let graph = Graph::load_experiment(&self.folder.join("graph.toml"), &changes, experiment)?;
-        backdrive::run_here(&graph, &mut |_, _| {})?;
+        backdrive_runs::way::run_here(&graph, &backdrive_runs::Silent, &mut |_, _| {})?;
         Ok(bag)
     }
 

@@ -1,7 +1,7 @@
 //! Keys that several kinds of nodes have: a simulated device, and the file that a key names.
 
 use crate::graph::files::Sources;
-use crate::graph::{DeviceFiles, Graph};
+use crate::graph::{DeviceFiles, Graph, Limits, Sensors};
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::tomlfile::{FileError, Table};
@@ -32,16 +32,16 @@ impl NodeReader<'_> {
             _ => None,
         };
         let substeps = table.integer("substeps", 1, 1000)?.map(|n| n as usize);
-        let enforced = table.one_of("limits", &[("enforced", true), ("ignored", false)])?.unwrap_or(true);
+        let ignored = table.one_of("limits", &Limits::ALL)? == Some(Limits::Ignored);
         let model = model.map(|mut model| {
-            if !enforced {
+            if ignored {
                 for axis in &mut model.axes {
                     (axis.force, axis.force_rate, axis.speed, axis.travel) = (None, None, None, None);
                 }
             }
             model
         });
-        let real_sensors = table.one_of("sensors", &[("as_modelled", true), ("ideal", false)])?.unwrap_or(true);
+        let real_sensors = table.one_of("sensors", &Sensors::ALL)? != Some(Sensors::Ideal);
         Ok(DeviceFiles { model, fragment, substeps, real_sensors, grip_changes: Vec::new() })
     }
 

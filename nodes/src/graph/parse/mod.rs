@@ -50,7 +50,7 @@ impl Graph {
         if rate_hz > MAX_RATE_HZ {
             return Err(top.error_at("rate_hz", format!("must be at most {MAX_RATE_HZ}, is {rate_hz}")));
         }
-        let clock = top.one_of("clock", &[("lockstep", Clock::Lockstep), ("realtime", Clock::Realtime)])?.unwrap_or_default();
+        let clock = top.one_of("clock", &Clock::ALL)?.unwrap_or_default();
         let steps = top.number("duration_s", Range::Positive)?.map(|s| (s * rate_hz).round().max(1.0) as u64);
         let seed = top.integer("seed", 0, i64::MAX)?.unwrap_or(1) as u64;
         let peer_timeout_s = top.number_or("peer_timeout_s", Range::Positive, 10.0)?;

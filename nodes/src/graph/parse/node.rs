@@ -5,7 +5,7 @@ use crate::graph::controller;
 use crate::graph::coupling;
 use crate::graph::hosts::read_host;
 use crate::graph::overrides::absolute;
-use crate::graph::{DeviceFiles, Direction, Node, NodeKind, ObserverFiles, Settings, bench};
+use crate::graph::{DeviceFiles, Direction, Hand, Node, NodeKind, ObserverFiles, Settings, bench};
 use backdrive_control::changing_grip::GripChange;
 use backdrive_control::hand::HandSettings;
 use backdrive_control::observer::{Quantity, Weights};
@@ -118,7 +118,7 @@ impl NodeReader<'_> {
         device.real_sensors = false;
         let high_pass_hz = table.number_or("high_pass_hz", Range::NonNegative, 0.0)?;
         let names = axis_names(&device);
-        let estimated = table.one_of("hand", &[("as_modelled", false), ("estimated", true)])?.unwrap_or(false);
+        let estimated = table.one_of("hand", &Hand::ALL)? == Some(Hand::Estimated);
         let range = table.numbers("hand_range", Range::Positive)?;
         let edge_without = table.number("edge_without", Range::Positive)?;
         let unused = range.as_ref().map(|_| "hand_range").or(edge_without.map(|_| "edge_without"));

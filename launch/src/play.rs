@@ -1,10 +1,8 @@
-//! `backdrive bag play`: a bag's messages again, verbatim, for whoever listens.
+//! A bag's messages again, verbatim, for whoever listens.
 
-use crate::failure::{Failure, code};
-use crate::output;
-use crate::progress::busy;
-use backdrive_bags::{BagError, BagHeader, Entry, PlayOptions, Reader, Sink, play as play_bag};
-use backdrive_launch::RunHome;
+use crate::RunHome;
+use crate::carry_error::CarryError;
+use backdrive_bags::{BagError, BagHeader, Entry, PlayOptions, PlayReport, Reader, Sink, play as play_bag};
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::Topic;
 use backdrive_nodes::graph::with_files_renamed;
@@ -14,49 +12,37 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-extern "C" fn on_interrupt(_: i32) {
-    INTERRUPTED.store(true, Ordering::SeqCst);
-}
-
-/// Publishes every message of ours over shared memory, at its time.
-pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
-    if !(speed.is_finite() && speed > 0.0) {
-        return Err(Failure { code: 2, message: format!("--speed must be above 0, is {speed}") });
-    }
-    let reader = Reader::open(bag).map_err(Failure::input)?;
+/// Publishes every message of ours over shared memory, at its time times 1 / `speed`, until the end of the bag or until `stop` is true.
+/// `note` hears once where it is played.
+///
+/// # Errors
+/// The bag cannot be read, or shared memory or the directory of the run cannot be used.
+pub fn play(bag: &Path, speed: f64, stop: &AtomicBool, note: &dyn Fn(&str)) -> Result<PlayReport, CarryError> {
+    let reader = Reader::open(bag).map_err(CarryError::input)?;
     let home = RunHome::system();
     let graph = reader.header().map_or(String::new(), graph_of);
-    let run = home.create(&graph, 1).map_err(Failure::from)?;
+    let run = home.create(&graph, 1)?;
     lay_out(reader.header().map_or(&[], |header| &header.files), &run.paths().root().join(FILES))?;
-    // SAFETY: the handler does nothing but store to an atomic.
-    unsafe {
-        let handler = nix::sys::signal::SigHandler::Handler(on_interrupt);
-        nix::sys::signal::signal(nix::sys::signal::Signal::SIGINT, handler).map_err(Failure::machine)?;
-    }
-    let mut transport = Iceoryx2::open(&run.paths().location(), "player").map_err(Failure::machine)?;
+    let mut transport = Iceoryx2::open(&run.paths().location(), "player").map_err(CarryError::machine)?;
     let mut publishers: HashMap<String, Box<dyn Publisher>> = HashMap::new();
     for topic in reader.topics() {
         if let Some(kind) = topic.kind {
-            let one = transport.publisher(&Topic { name: topic.name.clone(), kind }, 0).map_err(Failure::machine)?;
+            let one = transport.publisher(&Topic { name: topic.name.clone(), kind }, 0).map_err(CarryError::machine)?;
             publishers.insert(topic.name.clone(), one);
         }
     }
-    output::note(format_args!(
+    note(&format!(
         "playing {} topics of {} at {speed} times real time, in the run {}",
         publishers.len(),
         bag.display(),
         run.paths().root().display()
     ));
-    let mut sink = Speaker { publishers };
+    let mut sink = Speaker { publishers, stop };
     let options = PlayOptions { rate: speed, ..PlayOptions::default() };
-    let report = busy(&format!("playing {}", bag.display()), || play_bag(&reader, &options, &mut sink)).map_err(Failure::input);
+    let report = play_bag(&reader, &options, &mut sink).map_err(CarryError::input);
     drop((sink, transport));
-    run.remove().map_err(Failure::from)?;
-    let report = report?;
-    output::line(format_args!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3))?;
-    Ok(if report.finished { 0 } else { code::INTERRUPTED })
+    run.remove()?;
+    report
 }
 
 /// Folder of the bag's files beside the graph in the directory of the run.
@@ -69,20 +55,25 @@ fn graph_of(header: &BagHeader) -> String {
 }
 
 /// Writes the bag's files, each under its number, for its name may be anything.
-fn lay_out(files: &[(String, String)], folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+fn lay_out(files: &[(String, String)], folder: &Path) -> Result<(), CarryError> {
+    std::fs::create_dir_all(folder).map_err(|e| unwritten(folder, e))?;
     for (at, (_, text)) in files.iter().enumerate() {
         let path = folder.join(at.to_string());
-        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))?;
+        std::fs::write(&path, text).map_err(|e| unwritten(&path, e))?;
     }
     Ok(())
 }
 
-struct Speaker {
-    publishers: HashMap<String, Box<dyn Publisher>>,
+fn unwritten(path: &Path, error: std::io::Error) -> CarryError {
+    CarryError::Machine(format!("{}: cannot be written: {error}", path.display()))
 }
 
-impl Sink for Speaker {
+struct Speaker<'a> {
+    publishers: HashMap<String, Box<dyn Publisher>>,
+    stop: &'a AtomicBool,
+}
+
+impl Sink for Speaker<'_> {
     fn send(&mut self, entry: &Entry, message: Option<&Message>) -> Result<(), BagError> {
         match (message, self.publishers.get_mut(&entry.topic.name)) {
             (Some(message), Some(publisher)) => publisher.send(message).map_err(|e| BagError::Usage(e.to_string())),
@@ -91,6 +82,6 @@ impl Sink for Speaker {
     }
 
     fn stopped(&self) -> bool {
-        INTERRUPTED.load(Ordering::SeqCst)
+        self.stop.load(Ordering::SeqCst)
     }
 }

@@ -4,168 +4,139 @@ use crate::failure::{Failure, code};
 use crate::offered::{Step, lines};
 use crate::output;
 use backdrive_launch::{Cause, RunReport};
-use backdrive_pages::run::Shown;
 use backdrive_report::{Page, percent};
+use backdrive_runs::{Done, Fault, RunError};
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::summary::Summary;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-
-/// What a run gave.
-pub struct Done {
-    /// Steps done by the node that did most.
-    pub steps: u64,
-    /// Wall-clock time, s.
-    pub duration_s: f64,
-    /// From the supervisor; `None` for a run in one process.
-    pub report: Option<RunReport>,
-    /// Messages that are not in the bag, and samples that a node did not get.
-    pub lost: u64,
-    /// The bag, if one was recorded.
-    pub bag: Option<PathBuf>,
-    /// Whether its recorder ended and nothing is missing in it.
-    pub complete: bool,
-    /// Why the bag cannot be read, where it cannot.
-    pub unreadable: Option<String>,
-    /// What happened.
-    pub summary: Option<Summary>,
-}
+use std::path::Path;
 
 /// Next steps that a terminal shows; the page shows all.
 const SHOWN: usize = 2;
 
-impl Done {
-    /// What its page shows of it.
-    pub fn shown(&self) -> Shown<'_> {
-        Shown {
-            steps: self.steps,
-            duration_s: self.duration_s,
-            report: self.report.as_ref(),
-            lost: self.lost,
-            bag: self.bag.as_deref(),
-            complete: self.complete,
-            summary: self.summary.as_ref(),
-        }
-    }
-
-    /// 0 judged and stable, or there is no loop, which its text states; 1 not stable; 7 it cannot be judged. Before these, of a run that did not go as it
-    /// should: 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
-    pub fn exit_code(&self) -> u8 {
-        match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
-            (0, None | Some(Outcome::Stable)) => 0,
-            (0, Some(Outcome::NotJudged { .. })) => code::CANNOT_TELL,
-            (0, Some(Outcome::LimitCycle { .. } | Outcome::Unstable { .. } | Outcome::Limited { .. })) => code::NEGATIVE,
-            (fault, _) => fault,
-        }
-    }
-
-    /// How it went, whatever the loop did: 0 fine, 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
-    pub fn fault_code(&self) -> u8 {
-        if let Some(report) = &self.report {
-            match &report.cause {
-                Cause::NodeFailed { code, .. } if *code != 0 => return *code,
-                Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. } => return code::NODE,
-                Cause::Stranger { .. } => return code::MACHINE,
-                Cause::Stopped { .. } => return code::INTERRUPTED,
-                Cause::Completed if !report.orderly() => return code::NODE,
-                Cause::Completed => {}
-            }
-        }
-        if self.lost > 0 || self.unreadable.is_some() { code::LOST_DATA } else { 0 }
-    }
-
-    /// Writes its page, if one is wanted, prints the result, and gives the exit code.
-    /// `steps` are what to do next.
-    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool, steps: &[Step]) -> Result<u8, Failure> {
-        if let Some((html, page)) = page {
-            output::page(html, page)?;
-            output::note(format_args!("wrote {}", html.display()));
-        }
-        if json {
-            let mut all = self.json();
-            all["next"] = serde_json::to_value(steps).map_err(Failure::input)?;
-            output::line(all)?;
-        } else {
-            output::line(self.text())?;
-            // A sentence without a command stands above, where it belongs.
-            let with_commands: Vec<Step> = steps.iter().filter(|step| !step.commands.is_empty()).take(SHOWN).cloned().collect();
-            lines("next", 9, &with_commands).iter().try_for_each(output::line)?;
-        }
-        Ok(self.exit_code())
-    }
-
-    /// A few lines for a person.
-    pub fn text(&self) -> String {
-        let mut lines = Vec::new();
-        let rate = self.steps as f64 / self.duration_s;
-        let rate = if rate.is_finite() { format!(": {rate:.0} steps/s") } else { String::new() };
-        lines.push(format!("ran      {} steps in {:.3} s{rate}", self.steps, self.duration_s));
-        if let Some(report) = &self.report {
-            lines.extend(timing(report));
-            if report.cause != Cause::Completed {
-                lines.push(format!("ended    {}", report.cause));
-            }
-            let told = match &report.cause {
-                Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
-                Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } | Cause::Stranger { .. } => "",
-            };
-            if report.refused > 0 {
-                lines.push(format!("refused  {} messages of strangers; none was used", report.refused));
-            }
-            for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
-                lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
-            }
-        }
-        if let Some(summary) = &self.summary {
-            lines.push(happened(summary));
-        }
-        if let Some(bag) = &self.bag {
-            let complete = match self.lost {
-                _ if self.unreadable.is_some() => "cannot be read".to_string(),
-                0 if self.complete => "complete".to_string(),
-                0 => "cut off".to_string(),
-                lost => format!("{lost} messages lost"),
-            };
-            lines.push(format!("bag      {} ({complete})", bag.display()));
-        }
-        if let Some(why) = &self.unreadable {
-            lines.push(format!("UNREADABLE {why}"));
-        }
-        lines.retain(|l| !l.is_empty());
-        lines.join("\n")
-    }
-
-    /// For scripts.
-    pub fn json(&self) -> serde_json::Value {
-        let report = self.report.as_ref();
-        let summary = self.summary.as_ref();
-        json!({
-            "steps": self.steps,
-            "duration_s": self.duration_s,
-            "steps_per_s": (self.duration_s > 0.0).then(|| self.steps as f64 / self.duration_s),
-            "loop_p50_us": report.and_then(|r| r.loop_p50_us),
-            "loop_p99_us": report.and_then(|r| r.loop_p99_us),
-            "missed_deadlines": report.map(|r| r.missed_deadlines),
-            "lost": self.lost,
-            "refused": report.map(|r| r.refused),
-            "bag": self.bag,
-            "unreadable": self.unreadable,
-            "complete": self.bag.as_ref().map(|_| self.complete),
-            "loop_gain": summary.map(|s| s.loop_gain),
-            "last_loop_gain": summary.map(|s| s.last_loop_gain),
-            "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
-            "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
-            "first_contact_s": summary.and_then(|s| s.first_contact_s),
-            "contact_s": summary.map(|s| s.contact_s),
-            "no_loop": summary.and_then(|s| s.no_loop),
-            "margin": summary.and_then(|s| s.margin.as_ref()),
-            "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
-            "outcome_detail": summary.and_then(|s| s.outcome),
-            "run": report,
-        })
+/// 0 judged and stable, or there is no loop, which its text states; 1 not stable; 7 it cannot be judged. Before these, of a run that did not go as it
+/// should: 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
+fn exit_code(done: &Done) -> u8 {
+    match (done.fault(), done.summary.as_ref().and_then(|s| s.outcome)) {
+        (Some(fault), _) => code_of(fault),
+        (None, None | Some(Outcome::Stable)) => 0,
+        (None, Some(Outcome::NotJudged { .. })) => code::CANNOT_TELL,
+        (None, Some(Outcome::LimitCycle { .. } | Outcome::Unstable { .. } | Outcome::Limited { .. })) => code::NEGATIVE,
     }
 }
 
+fn code_of(fault: Fault) -> u8 {
+    match fault {
+        Fault::Exit(code) => code,
+        Fault::Node => code::NODE,
+        Fault::Stranger => code::MACHINE,
+        Fault::Stopped => code::INTERRUPTED,
+        Fault::Lost => code::LOST_DATA,
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Failure {
+        match error {
+            RunError::Input(message) => Failure::input(message),
+            RunError::Machine(message) => Failure::machine(message),
+            RunError::Bag(error) => Failure::bag(error),
+            RunError::Launch(error) => Failure::from(error),
+            RunError::Experiment { fault, message } => Failure { code: code_of(fault), message },
+        }
+    }
+}
+
+/// Writes its page, if one is wanted, prints the result, and gives the exit code.
+/// `steps` are what to do next.
+pub fn tell(done: &Done, page: Option<(&Path, Page)>, json: bool, steps: &[Step]) -> Result<u8, Failure> {
+    if let Some((html, page)) = page {
+        output::page(html, page)?;
+        output::note(format_args!("wrote {}", html.display()));
+    }
+    if json {
+        let mut all = as_json(done);
+        all["next"] = serde_json::to_value(steps).map_err(Failure::input)?;
+        output::line(all)?;
+    } else {
+        output::line(text(done))?;
+        // A sentence without a command stands above, where it belongs.
+        let with_commands: Vec<Step> = steps.iter().filter(|step| !step.commands.is_empty()).take(SHOWN).cloned().collect();
+        lines("next", 9, &with_commands).iter().try_for_each(output::line)?;
+    }
+    Ok(exit_code(done))
+}
+
+/// A few lines for a person.
+fn text(done: &Done) -> String {
+    let mut lines = Vec::new();
+    let rate = done.steps as f64 / done.duration_s;
+    let rate = if rate.is_finite() { format!(": {rate:.0} steps/s") } else { String::new() };
+    lines.push(format!("ran      {} steps in {:.3} s{rate}", done.steps, done.duration_s));
+    if let Some(report) = &done.report {
+        lines.extend(timing(report));
+        if report.cause != Cause::Completed {
+            lines.push(format!("ended    {}", report.cause));
+        }
+        let told = match &report.cause {
+            Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
+            Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } | Cause::Stranger { .. } => "",
+        };
+        if report.refused > 0 {
+            lines.push(format!("refused  {} messages of strangers; none was used", report.refused));
+        }
+        for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
+            lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
+        }
+    }
+    if let Some(summary) = &done.summary {
+        lines.push(happened(summary));
+    }
+    if let Some(bag) = &done.bag {
+        let complete = match done.lost {
+            _ if done.unreadable.is_some() => "cannot be read".to_string(),
+            0 if done.complete => "complete".to_string(),
+            0 => "cut off".to_string(),
+            lost => format!("{lost} messages lost"),
+        };
+        lines.push(format!("bag      {} ({complete})", bag.display()));
+    }
+    if let Some(why) = &done.unreadable {
+        lines.push(format!("UNREADABLE {why}"));
+    }
+    lines.retain(|l| !l.is_empty());
+    lines.join("\n")
+}
+
+/// For scripts.
+fn as_json(done: &Done) -> serde_json::Value {
+    let report = done.report.as_ref();
+    let summary = done.summary.as_ref();
+    json!({
+        "steps": done.steps,
+        "duration_s": done.duration_s,
+        "steps_per_s": (done.duration_s > 0.0).then(|| done.steps as f64 / done.duration_s),
+        "loop_p50_us": report.and_then(|r| r.loop_p50_us),
+        "loop_p99_us": report.and_then(|r| r.loop_p99_us),
+        "missed_deadlines": report.map(|r| r.missed_deadlines),
+        "lost": done.lost,
+        "refused": report.map(|r| r.refused),
+        "bag": done.bag,
+        "unreadable": done.unreadable,
+        "complete": done.bag.as_ref().map(|_| done.complete),
+        "loop_gain": summary.map(|s| s.loop_gain),
+        "last_loop_gain": summary.map(|s| s.last_loop_gain),
+        "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
+        "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
+        "first_contact_s": summary.and_then(|s| s.first_contact_s),
+        "contact_s": summary.map(|s| s.contact_s),
+        "no_loop": summary.and_then(|s| s.no_loop),
+        "margin": summary.and_then(|s| s.margin.as_ref()),
+        "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
+        "outcome_detail": summary.and_then(|s| s.outcome),
+        "run": report,
+    })
+}
 /// What happened, in a few lines for a person.
 fn happened(summary: &Summary) -> String {
     let mut lines = Vec::new();
@@ -206,7 +177,7 @@ const MANY_MISSED: f64 = 1e-3;
 
 /// The loop's times and the deadlines that were missed. In real time the node that missed most is the one to show, with its own numbers: the
 /// misses of all nodes beside the times of one that kept its own would hide where the loop is late.
-pub(super) fn timing(report: &RunReport) -> Vec<String> {
+fn timing(report: &RunReport) -> Vec<String> {
     let times = |p50: f64, p99: f64| format!("p50 {p50:.1} us, p99 {p99:.1} us");
     let of = |name: &str| report.nodes.iter().find(|n| n.name == name).and_then(|n| n.status.as_ref());
     let late = report.latest_node.as_ref().and_then(|(name, most)| Some((name, *most, of(name)?)));

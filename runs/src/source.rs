@@ -1,8 +1,7 @@
 //! Where the graph of a run comes from: a graph file, or a bag, whose graph is run again with the files that the bag holds.
 
-use crate::failure::Failure;
-use crate::offered::free;
-use backdrive_bags::Reader;
+use crate::error::RunError;
+use backdrive_bags::{Reader, free};
 use backdrive_nodes::graph::{Files, Graph, Overrides};
 use backdrive_stability::summary::graph_of;
 use std::fs::File;
@@ -14,7 +13,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When the file cannot be read, or is neither.
-pub fn load(path: &Path, changes: &Overrides) -> Result<Graph, Failure> {
+pub fn load(path: &Path, changes: &Overrides) -> Result<Graph, RunError> {
     let (graph, from_bag) = match is_bag(path) {
         true => (of_bag(path, changes)?, true),
         false => (Graph::load(path, changes)?, false),
@@ -36,11 +35,11 @@ pub fn runs_from_its_bag(graph: &Graph) -> bool {
 }
 
 /// The graph of a bag, its files those that the bag holds, without the folders in which they lay.
-fn of_bag(path: &Path, changes: &Overrides) -> Result<Graph, Failure> {
-    let reader = Reader::open(path).map_err(Failure::input)?;
+fn of_bag(path: &Path, changes: &Overrides) -> Result<Graph, RunError> {
+    let reader = Reader::open(path).map_err(RunError::input)?;
     let mut graph = graph_of(&reader, changes)?;
     if !runs_from_its_bag(&graph) {
-        return Err(Failure::input(format!(
+        return Err(RunError::input(format!(
             "{}: its graph has programs of your own or several hosts, which a bag does not hold; run its graph file",
             path.display()
         )));

@@ -1,12 +1,10 @@
 //! How the nodes of a run are carried out: in this process, or each in its own.
 
-use super::done::Done;
-use crate::cli::{self, Transport};
-use crate::failure::Failure;
-use crate::graph::buildable;
-use crate::network::place;
-use crate::{output, progress};
+use crate::done::Done;
+use crate::error::RunError;
+use crate::watch::Watch;
 use backdrive_bags::{Completeness, Reader, Recorder, RecorderOptions, check_target};
+use backdrive_launch::asked::{Meeting, place};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_launch::{Cause, Place, RunReport, SuperviseOptions, Wire};
 use backdrive_msgs::Message;
@@ -15,9 +13,9 @@ use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::ros2::Courier;
-use backdrive_stability::summary::{Traces, summarise};
+use backdrive_stability::summary::{SummaryError, Traces, summarise};
 use backdrive_stability::unjudged::Unjudged;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// How the nodes of a run are carried out.
@@ -28,60 +26,88 @@ pub enum Way {
     Processes(Place),
 }
 
+/// How messages travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transport {
+    /// A process for each node, over shared memory.
+    Iceoryx2,
+    /// A process for each node, over ROS 2 (DDS).
+    Ros2,
+    /// All nodes in this process.
+    Inproc,
+}
+
 impl Way {
-    /// What the command line asks for.
-    pub(super) fn of(graph: &Graph, options: &cli::Run) -> Result<Way, Failure> {
-        let wire = match options.transport {
-            Some(Transport::Inproc) if options.host.is_some() => {
-                return Err(Failure::input("--transport inproc is for one host; leave --host out"));
+    /// As it is asked; without a transport shared memory on one host, else ROS 2. `meeting` states no wire.
+    ///
+    /// # Errors
+    /// Host, secret or network contradict the transport or the graph.
+    pub fn of(graph: &Graph, transport: Option<Transport>, meeting: Meeting) -> Result<Way, RunError> {
+        let wire = match transport {
+            Some(Transport::Inproc) if meeting.host.is_some() => {
+                return Err(RunError::input("--transport inproc is for one host; leave --host out"));
             }
-            Some(Transport::Inproc) if options.secret.is_some() => {
-                return Err(Failure::input("--secret is what several hosts share; leave it out without --host"));
+            Some(Transport::Inproc) if meeting.secret.is_some() => {
+                return Err(RunError::input("--secret is what several hosts share; leave it out without --host"));
             }
             Some(Transport::Inproc) => return Ok(Way::Here),
             Some(Transport::Iceoryx2) => Some(Wire::Iceoryx2),
             Some(Transport::Ros2) => Some(Wire::Ros2),
             None => None,
         };
-        place(graph, wire, options.host.as_deref(), options.secret.as_deref(), &options.network).map(Way::Processes)
+        Ok(Way::Processes(place(graph, &Meeting { wire, ..meeting })?))
     }
 }
 
+/// Whether every node of ours can be built: reported before a process is started, and once.
+///
+/// # Errors
+/// The first node that cannot be built.
+pub fn buildable(graph: &Graph) -> Result<(), RunError> {
+    for node in graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && n.command.is_none()) {
+        plan(graph, &node.name).map_err(|e| RunError::input(format!("{}: {e}", graph.path.display())))?;
+    }
+    Ok(())
+}
+
 /// Runs one graph to its end.
-pub fn run_graph(graph: &Graph, way: &Way) -> Result<Done, Failure> {
+///
+/// # Errors
+/// A node cannot be built, the bag cannot be written, or this machine does not let the nodes run.
+pub fn run_graph(graph: &Graph, way: &Way, watch: &dyn Watch) -> Result<Done, RunError> {
     match way {
-        Way::Processes(place) => run_processes(graph, place),
-        Way::Here => run_here(graph, &mut |_, _| {}),
+        Way::Processes(place) => run_processes(graph, place, watch),
+        Way::Here => run_here(graph, watch, &mut |_, _| {}),
     }
 }
 
 /// Reports what would stop a run before it begins.
-fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
+fn ready(graph: &Graph, host: Option<&str>) -> Result<(), RunError> {
     buildable(graph)?;
     // A run that ends with its last step, for a bag that cannot be written, would be lost whole.
-    graph.bag_of(host).map_or(Ok(()), |bag| check_target(&bag, graph.overwrite).map_err(Failure::bag))
+    graph.bag_of(host).map_or(Ok(()), |bag| check_target(&bag, graph.overwrite).map_err(RunError::Bag))
 }
 
 /// How long hosts may take to find each other: somebody walks from one to the other.
 const HOSTS_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Who waits by looking takes a processor from whom it waits for, where they share one.
-fn too_many_poll(graph: &Graph, host: Option<&str>) {
+fn too_many_poll(graph: &Graph, host: Option<&str>, watch: &dyn Watch) {
     let here = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && host.is_none_or(|host| graph.runs_on(n, host)));
     let processes = here.filter(|n| graph.process_of(&n.name).first().is_some_and(|first| first.name == n.name)).count();
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     if graph.polls && processes > processors {
-        output::note(format_args!(
+        watch.note(&format!(
             "warning: wait = \"poll\" keeps a processor busy for each process, and {processes} processes share {processors}: the loop will be slow; \
              take it away, or let nodes share a process (together)"
         ));
     }
 }
 
-fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
+fn run_processes(graph: &Graph, place: &Place, watch: &dyn Watch) -> Result<Done, RunError> {
     ready(graph, place.host.as_deref())?;
-    too_many_poll(graph, place.host.as_deref());
-    let courier = Courier::start(&place.network).map_err(Failure::machine)?;
+    too_many_poll(graph, place.host.as_deref(), watch);
+    let courier = Courier::start(&place.network).map_err(RunError::machine)?;
     let mut options = SuperviseOptions::default();
     if place.host.is_some() {
         options.ready_timeout = HOSTS_TIMEOUT;
@@ -91,11 +117,13 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
     // What is known of the run is reported even where its bag cannot be read.
-    let read = |bag: &PathBuf| (summarise(bag), whole(bag));
-    let read = bag.as_ref().map(|bag| progress::busy(&format!("reading {}", bag.display()), || read(bag)));
+    let read = bag.as_ref().map(|bag| {
+        let _reading = watch.begins(&format!("reading {}", bag.display()));
+        (summarise(bag), whole(bag))
+    });
     let (summary, (complete, mut unreadable)) = read.map_or((None, (false, None)), |(summary, whole)| (Some(summary), whole));
-    let told = |e: Failure| output::note(format_args!("warning: {}", e.message));
-    let mut summary = summary.and_then(|summary| summary.map_err(|e| told(e.into())).ok());
+    let told = |e: SummaryError| watch.note(&format!("warning: {e}"));
+    let mut summary = summary.and_then(|summary| summary.map_err(|e| told(e)).ok());
     if report.bag.as_deref().is_some_and(|bag| !bag.exists()) {
         unreadable = Some("is not there any more".to_string());
     }
@@ -120,7 +148,7 @@ fn whole(bag: &Path) -> (bool, Option<String>) {
 }
 
 /// Why a run must not be called stable, whatever its signals look like.
-pub(super) fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
+fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
     let died = matches!(report.cause, Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. });
     if died || !report.deaths.is_empty() {
         return Some(Unjudged::NodeDied);
@@ -130,42 +158,48 @@ pub(super) fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
 
 /// Runs a graph in this process, in lockstep; `hear` gets every message with its topic. As with processes, its bag has its name from the
 /// beginning: what was recorded survives a run that is cut short.
-pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
-    in_this_process(graph, false, hear)
+///
+/// # Errors
+/// The graph cannot run in one process, a node cannot be built, or the bag cannot be written.
+pub fn run_here(graph: &Graph, watch: &dyn Watch, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, RunError> {
+    in_this_process(graph, false, watch, hear)
 }
 
 /// The same for what can be repeated: its bag is there whole or not at all.
-pub fn repeat_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
-    in_this_process(graph, true, hear)
+///
+/// # Errors
+/// As [`run_here`].
+pub fn repeat_here(graph: &Graph, watch: &dyn Watch, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, RunError> {
+    in_this_process(graph, true, watch, hear)
 }
 
-fn in_this_process(graph: &Graph, all_or_nothing: bool, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
+fn in_this_process(graph: &Graph, all_or_nothing: bool, watch: &dyn Watch, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, RunError> {
     if graph.timing.clock == Clock::Realtime {
-        return Err(Failure::input("one process runs in lockstep only; use --clock lockstep, or --transport iceoryx2"));
+        return Err(RunError::input("one process runs in lockstep only; use --clock lockstep, or --transport iceoryx2"));
     }
     let Some(steps) = graph.timing.steps else {
-        return Err(Failure::input(format!("{}: needs a duration_s to run in one process", graph.path.display())));
+        return Err(RunError::input(format!("{}: needs a duration_s to run in one process", graph.path.display())));
     };
     if let Some(node) = graph.nodes.iter().find(|n| n.command.is_some()) {
-        return Err(Failure::input(format!(
+        return Err(RunError::input(format!(
             "node \"{}\" is a program of its own, which one process cannot hold; run it with --transport iceoryx2",
             node.name
         )));
     }
     ready(graph, None)?;
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
-    let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
+    let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(RunError::input)?;
     let (record, header) = recording(graph, "recorder", None);
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
     let place: Vec<Option<usize>> = names.iter().map(|name| record.topics.iter().position(|t| t.name == *name)).collect();
     let mut recorder = match &graph.bag {
         Some(bag) => {
             let options = RecorderOptions { whole: all_or_nothing, ..recorder_options(graph) };
-            Some(Recorder::create(bag, &header, &options).map_err(Failure::bag)?)
+            Some(Recorder::create(bag, &header, &options).map_err(RunError::Bag)?)
         }
         None => None,
     };
-    let bar = progress::steps(steps, &graph.title);
+    watch.steps(&graph.title, 0, steps);
     let mut traces = Traces::of(graph);
     let (started, mut failed, mut told) = (Instant::now(), None, Vec::new());
     let mut done = 0;
@@ -186,17 +220,19 @@ fn in_this_process(graph: &Graph, all_or_nothing: bool, hear: &mut dyn FnMut(&st
             }
         };
         sequence.run(some, Some(&mut tap));
-        bar.suspend(|| told.drain(..).for_each(|line| output::note(format_args!("{line}"))));
+        told.drain(..).for_each(|line| watch.note(&line));
         if let Some(recorder) = &mut recorder {
             recorder.checkpoint();
         }
         done += some;
-        bar.set_position(done);
+        if done < steps {
+            watch.steps(&graph.title, done, steps);
+        }
     }
-    bar.finish_and_clear();
+    watch.steps(&graph.title, steps, steps);
     let lost = match recorder.map(Recorder::finish).transpose() {
         Ok(completeness) => completeness.map_or(0, |c| c.lost()),
-        Err(e) => return Err(Failure::machine(failed.unwrap_or(e))),
+        Err(e) => return Err(RunError::machine(failed.unwrap_or(e))),
     };
     let mut summary = traces.summary(graph);
     summary.hold_back((lost > 0).then_some(Unjudged::Lost { messages: lost }));

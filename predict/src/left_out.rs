@@ -1,6 +1,6 @@
 //! What leaving something out costs: the error on recordings with it and without.
 
-use crate::failure::Failure;
+use crate::error::PredictError;
 use backdrive_diagnosis::belief::compare::{predictions, qualities};
 use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
@@ -27,7 +27,7 @@ pub struct Errors {
 ///
 /// # Errors
 /// When a recording is wrong, or the model itself cannot be simulated.
-pub fn errors(on: &[PathBuf], model: &Path, ignored: &[String], left_out: &[LeftOut]) -> Result<Errors, Failure> {
+pub fn errors(on: &[PathBuf], model: &Path, ignored: &[String], left_out: &[LeftOut]) -> Result<Errors, PredictError> {
     let opened = open::open(on, Some(model), None, ignored)?;
     let problem = opened.problem;
     let (records, of) = match problem.held_out.is_empty() {
@@ -39,7 +39,8 @@ pub fn errors(on: &[PathBuf], model: &Path, ignored: &[String], left_out: &[Left
         changes.iter().for_each(|change| change.apply(&mut model));
         error_of(&problem, model, &records)
     };
-    let with_all = changed(&[]).ok_or_else(|| Failure::input(format!("{}: cannot be simulated on the recordings", model.display())))?;
+    let with_all =
+        changed(&[]).ok_or_else(|| PredictError::input(format!("{}: cannot be simulated on the recordings", model.display())))?;
     let without = |left: &LeftOut| if left.changes.is_empty() { None } else { changed(&left.changes.iter().collect::<Vec<_>>()) };
     Ok(Errors {
         of,

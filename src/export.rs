@@ -1,16 +1,15 @@
 //! `backdrive export`: a model as another program's text, and what that leaves out.
 
-mod error_without;
-
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
 use crate::output::may_replace;
 use crate::progress::busy;
-use backdrive_export::{Exported, LeftOut, feedforward, isaac, mjcf, urdf};
+use backdrive_export::target::{Options, export as written};
+use backdrive_export::{Exported, LeftOut};
 use backdrive_plant::model::Model;
+use backdrive_predict::left_out::{Errors, errors};
 use backdrive_report::percent;
-use error_without::{Errors, errors};
 use serde_json::{Value, json};
 
 /// Exports, and prints what is left out.
@@ -20,7 +19,8 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
         output::writable(out)?;
     }
     let model = Model::load(&options.model)?;
-    let exported = written(&model, options).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
+    let how = Options { to: options.to, language: options.language, width: options.width, step: options.step };
+    let exported = written(&model, &how).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
     let errors = match options.on.is_empty() {
         true => None,
         false => Some(busy("simulating the recordings without what is left out", || {
@@ -39,22 +39,6 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
         told(options, &exported, errors.as_ref())?;
     }
     Ok(if !exported.left_out.iter().any(LeftOut::matters) { 0 } else { code::NEGATIVE })
-}
-
-fn written(model: &Model, options: &cli::Export) -> Result<Exported, backdrive_export::ExportError> {
-    match options.to {
-        cli::Target::Mjcf => mjcf::export(model, options.step),
-        cli::Target::Urdf => urdf::export(model),
-        cli::Target::Isaac => isaac::export(model),
-        cli::Target::Feedforward => {
-            let language = match options.language {
-                cli::Language::C => feedforward::Language::C,
-                cli::Language::Python => feedforward::Language::Python,
-                cli::Language::Yaml => feedforward::Language::Yaml,
-            };
-            feedforward::export(model, language, options.width)
-        }
-    }
 }
 
 /// For a person: the text where it has no file, and the list.
@@ -100,20 +84,11 @@ fn list(options: &cli::Export, left_out: &[LeftOut], errors: Option<&Errors>) ->
             text += &format!(
                 "the error that this makes on recordings: backdrive export {} --to {} --on SET\n",
                 options.model.display(),
-                word(options.to)
+                options.to.word()
             )
         }
     }
     text.trim_end().to_string()
-}
-
-fn word(target: cli::Target) -> &'static str {
-    match target {
-        cli::Target::Mjcf => "mjcf",
-        cli::Target::Urdf => "urdf",
-        cli::Target::Isaac => "isaac",
-        cli::Target::Feedforward => "feedforward",
-    }
 }
 
 fn as_json(model: &Model, options: &cli::Export, exported: &Exported, errors: Option<&Errors>) -> Value {
@@ -127,7 +102,7 @@ fn as_json(model: &Model, options: &cli::Export, exported: &Exported, errors: Op
     let left_out: Vec<Value> = exported.left_out.iter().enumerate().map(one).collect();
     let mut all = json!({
         "model": model.name,
-        "to": word(options.to),
+        "to": options.to.word(),
         "out": options.out,
         "left_out": left_out,
         "notes": exported.notes,

@@ -1,0 +1,22 @@
+//! Who watches a run.
+
+use std::any::Any;
+
+/// What a run tells while it lasts.
+pub trait Watch {
+    /// A note or a warning: a sentence.
+    fn note(&self, _sentence: &str) {}
+
+    /// Something begins that may take long and counts no steps; it lasts until the result is dropped.
+    fn begins(&self, _doing: &str) -> Box<dyn Any> {
+        Box::new(())
+    }
+
+    /// `done` of `all` steps of the run of this title are done. The run has ended where both are equal.
+    fn steps(&self, _title: &str, _done: u64, _all: u64) {}
+}
+
+/// Nobody watches.
+pub struct Silent;
+
+impl Watch for Silent {}
