@@ -14,7 +14,7 @@ pub struct Asked {
     pub domain: Option<u16>,
     /// Names or addresses of the network interfaces to use; all where none is named.
     pub interfaces: Vec<String>,
-    /// Addresses (IPv4) or names of hosts that are told by unicast.
+    /// Addresses (IPv4) or names of hosts that get unicast announcements.
     pub peers: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ pub struct Meeting {
     pub network: Asked,
 }
 
-/// What of the network, the hosts or the secret cannot be as it is asked: a sentence.
+/// What of the network, the hosts or the secret is wrong: a sentence.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct AskedError(String);
@@ -79,7 +79,7 @@ fn address(name: &str) -> Result<Ipv4Addr, AskedError> {
 /// Where the nodes of a graph meet, on one of its hosts if one is named.
 ///
 /// # Errors
-/// The graph has no such host, the secret is missing or cannot be read, or the network is not as it is asked.
+/// The graph has no such host, the secret is missing or cannot be read, or the network options are wrong.
 pub fn place(graph: &Graph, asked: &Meeting) -> Result<Place, AskedError> {
     let (wire, host, secret) = (asked.wire, asked.host.as_deref(), asked.secret.as_deref());
     if secret.is_some() && host.is_none() {

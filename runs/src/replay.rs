@@ -1,4 +1,4 @@
-//! A recording run again: the recorded operator in, everything else executed anew.
+//! A recording run again: the recorded operator in, everything else executed again.
 
 use crate::done::Done;
 use crate::error::RunError;

@@ -2,7 +2,7 @@
 
 use std::any::Any;
 
-/// What a run tells while it lasts.
+/// What a run reports while it lasts.
 pub trait Watch {
     /// A note or a warning: a sentence.
     fn note(&self, _sentence: &str) {}

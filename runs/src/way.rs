@@ -38,7 +38,7 @@ pub enum Transport {
 }
 
 impl Way {
-    /// As it is asked; without a transport shared memory on one host, else ROS 2. `meeting` states no wire.
+    /// By the options; without a transport shared memory on one host, else ROS 2. `meeting` states no wire.
     ///
     /// # Errors
     /// Host, secret or network contradict the transport or the graph.

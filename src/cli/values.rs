@@ -25,7 +25,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be above 0".to_string()) })
 }
 
-/// Values of an option: the word (and, behind a bar, another for it), what its help says of it, and what it means.
+/// Values of an option: the word (and, behind a bar, another for it), its help, and what it means.
 pub fn choices<T: Clone + Send + Sync + 'static, const N: usize>(
     all: [(&'static str, &'static str, T); N],
 ) -> impl TypedValueParser<Value = T> {

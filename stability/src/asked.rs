@@ -40,7 +40,7 @@ pub struct Options {
     pub grips: Vec<f64>,
 }
 
-/// A recording or an option that cannot be as it is asked: a sentence.
+/// A recording or an option that is wrong: a sentence.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct AskedError(pub(crate) String);

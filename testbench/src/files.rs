@@ -12,7 +12,7 @@ const SHAFT: &str = include_str!("../../plant/models/engine-test-bench.toml");
 /// Name and text of each file.
 ///
 /// # Errors
-/// The structure of the shaft does not take its numbers.
+/// The structure of the shaft does not take the identified parameters.
 pub fn files(found: &Identified) -> Result<[(&'static str, String); 3], FileError> {
     // Combustion's ripple is above what the observer passes on.
     let engine = EngineFile { engine: found.bench.engine.clone(), ripple: Ripple { per_revolution: 0.0, share: 0.0 } };

@@ -1,6 +1,6 @@
 //! Choices that a graph file states by a word, and that the command line changes.
 
-/// Who tells the canceller how firmly the hand holds.
+/// Where the canceller takes the firmness of the grip from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hand {
     /// The grip file.
