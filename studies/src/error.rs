@@ -51,6 +51,12 @@ impl From<Failure> for StudyError {
     }
 }
 
+impl From<backdrive_runs::RunError> for StudyError {
+    fn from(error: backdrive_runs::RunError) -> StudyError {
+        StudyError::Failure(error.into())
+    }
+}
+
 /// A failed step of a study with its error.
 pub(crate) fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError::Diagnosis(error.to_string())
