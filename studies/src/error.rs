@@ -53,7 +53,7 @@ impl From<Failure> for StudyError {
 
 impl From<backdrive_runs::RunError> for StudyError {
     fn from(error: backdrive_runs::RunError) -> StudyError {
-        StudyError::Failure(Failure::from(error))
+        StudyError::Failure(error.into())
     }
 }
 
