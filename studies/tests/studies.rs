@@ -220,3 +220,13 @@ fn the_double_pendulum_s_joints_rub() {
         assert!(after < 0.6 * before, "{joint}: {after} {before}");
     }
 }
+
+#[test]
+fn machines() {
+    let Some(report) = report_of_a_search("machines") else { return };
+    // KUKA axis 6: regression of the same torque gives 0.9 to 1.2 N m, by band.
+    let friction = report.figure_named("KUKA axis 6 friction");
+    assert!((0.7..1.5).contains(&friction), "{friction}");
+    let (ours, by_hand) = (report.figure_named("KUKA axis 6 error"), report.figure_named("KUKA axis 6 error by least squares"));
+    assert!(ours <= by_hand, "{ours} {by_hand}");
+}
