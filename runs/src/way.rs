@@ -122,8 +122,8 @@ fn run_processes(graph: &Graph, place: &Place, watch: &dyn Watch) -> Result<Done
         (summarise(bag), whole(bag))
     });
     let (summary, (complete, mut unreadable)) = read.map_or((None, (false, None)), |(summary, whole)| (Some(summary), whole));
-    let told = |e: SummaryError| watch.note(&format!("warning: {e}"));
-    let mut summary = summary.and_then(|summary| summary.map_err(told).ok());
+    let warn = |e: SummaryError| watch.note(&format!("warning: {e}"));
+    let mut summary = summary.and_then(|summary| summary.map_err(warn).ok());
     if report.bag.as_deref().is_some_and(|bag| !bag.exists()) {
         unreadable = Some("is not there any more".to_string());
     }
