@@ -176,7 +176,7 @@ fn shown(error: Option<f64>) -> String {
 /// The size of dry friction that a finding states, whichever of its laws it is.
 fn dry_friction(finding: &Finding) -> Option<f64> {
     let key = match finding.physics.as_str() {
-        "coulomb" | "warming_friction" => "force",
+        "coulomb" | "warm_friction" => "force",
         "friction_deficit" | "stribeck" | "lugre" | "dahl" => "coulomb",
         "asymmetric_coulomb" => "positive",
         _ => return None,
