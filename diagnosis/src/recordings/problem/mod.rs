@@ -68,6 +68,11 @@ impl Problem {
         matches!(place, Place::Signal(signal) if names.into_iter().any(|name| name == signal))
     }
 
+    /// Whether the model has a position that no spring holds: an error of its force then moves it ever farther away.
+    pub fn drifts(&self) -> bool {
+        self.lag.iter().any(|lag| *lag > 0)
+    }
+
     /// Bodies that a measured motion of zero holds still in all recordings: a law between such a body and another does what it does between that one and the
     /// ground.
     pub fn standing_bodies(&self) -> Vec<&str> {
