@@ -224,7 +224,7 @@ fn the_double_pendulum_s_joints_rub() {
 #[test]
 fn machines() {
     let Some(report) = report_of_a_search("machines") else { return };
-    // Least squares (SciPy, 6 to 48 Hz) gives 0.60 to 0.62 N m beside 2.5 N m s/rad; a law that is lower near rest takes part of the viscous friction.
+    // Least squares (studies/machines/hand_made.py, 6 to 48 Hz) gives 0.59 to 0.61 N m beside 2.5 N m s/rad; a law that is lower near rest takes part of it.
     let friction = report.figure_named("KUKA axis 6 friction");
     assert!((0.5..1.8).contains(&friction), "{friction}");
     let (ours, by_hand) = (report.figure_named("KUKA axis 6 error"), report.figure_named("KUKA axis 6 error by least squares"));

@@ -2,6 +2,7 @@
 
 use crate::arms::audit::audit;
 use crate::arms::consistent::consistent;
+use crate::arms::coupled::coupled_by_many;
 use crate::arms::drawn::{Drawn, drawn};
 use crate::arms::error::ArmError;
 use crate::arms::excitation::RATE;
@@ -119,6 +120,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             crate::verdict::words::place(&place(&data, term))
         ));
     }
+    notes.extend(coupled_by_many(problem, &found.best.structure));
     if data.most_tolerance == 0 {
         notes.push(format!(
             "{} has no motor, so its friction is known only in proportion to its inertia. Much of the torque of another joint is unexplained, so \

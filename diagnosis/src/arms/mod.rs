@@ -10,6 +10,7 @@
 pub mod audit;
 pub mod base;
 pub mod consistent;
+mod coupled;
 pub mod diagnose;
 pub mod drawn;
 pub mod error;

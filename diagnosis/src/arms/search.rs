@@ -4,7 +4,7 @@ use crate::arms::consistent::consistent;
 use crate::arms::error::ArmError;
 use crate::arms::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::arms::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
-use crate::arms::physics::{Physics, Term, candidates};
+use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
 use crate::belief::predictive::{Gain, gain};
@@ -12,6 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Effects that are added at most, without those that every joint has.
 pub const MOST: usize = 8;
+/// From this number of added effects on that not every joint has, a search is made once more from another start.
+const MANY_RARE: usize = 3;
 /// Candidates that are fitted in full in each round, those that promise most.
 const FITTED: usize = 10;
 /// The same for effects that inertial parameters can compensate, where they are free.
@@ -82,7 +84,7 @@ pub struct Rival {
 /// # Errors
 /// Where a fit cannot be computed at all.
 pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
-    let found = search_within(data, without, most, stop)?;
+    let found = searched_again(data, without, most, stop)?;
     if !(0..data.problem.joints.len()).any(|j| data.is_passive(j)) || found.best.structure.tolerance == 0 {
         return Ok(found);
     }
@@ -94,10 +96,28 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
     }
     data.most_tolerance = 0;
     data.see(&data.problem.bodies.nominal)?;
-    search_within(data, without, most, stop)
+    searched_again(data, without, most, stop)
 }
 
-fn search_within(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
+/// Searches; where that ends with many rare effects, once more with friction and armature at every joint from the start. Rare effects take the place of common
+/// ones that are not there when they are tried. Of the two, that with fewer rare effects is kept, unless it surely predicts held-out segments worse.
+fn searched_again(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
+    let found = search_within(data, without, most, stop, Start::AsGiven)?;
+    if rare(&found.best.structure) < MANY_RARE || stop.load(Ordering::Relaxed) {
+        return Ok(found);
+    }
+    data.see(&data.problem.bodies.nominal)?;
+    let again = search_within(data, without, most, stop, Start::WithFriction)?;
+    let (mine, other) = (rare(&found.best.structure), rare(&again.best.structure));
+    let is_surely_better = |a: &Fit, b: &Fit| compare(data, a, b, &found.weights).is_some_and(|g| g.is_sure());
+    if is_surely_better(&found.best, &again.best) || other < mine && !is_surely_better(&again.best, &found.best) {
+        return Ok(again);
+    }
+    data.see(&data.parameters(&found.best))?;
+    Ok(found)
+}
+
+fn search_within(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool, from: Start) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
@@ -105,9 +125,9 @@ fn search_within(data: &mut Data, without: &[String], most: usize, stop: &Atomic
         .collect();
     let nominal = data.nominal_structure();
     let mut weights = first_weights(data, &nominal).ok_or_else(failed)?;
-    let as_given = data.fit(&nominal, &weights).ok_or_else(failed)?;
     let mut tried = Vec::new();
-    let mut best = as_given.clone();
+    let first = if from == Start::WithFriction { with_friction(data, &pool, &nominal) } else { nominal.clone() };
+    let mut best = data.fit(&first, &weights).ok_or_else(failed)?;
     // Twice: what was found is the better view of what the joints pass on, and of how much their residuals scatter.
     for round in 0..2 {
         best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
@@ -141,7 +161,6 @@ fn search_within(data: &mut Data, without: &[String], most: usize, stop: &Atomic
 /// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor or a gear that is not there. (Without a motor the
 /// load at a joint is its friction: friction in proportion to the load would be in proportion to itself.)
 fn may_be(data: &Data, term: &Term) -> bool {
-    use crate::arms::physics::At;
     let of_a_motor = matches!(
         term.physics,
         Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash | Physics::LoadFriction
@@ -156,6 +175,23 @@ fn may_be(data: &Data, term: &Term) -> bool {
     }
 }
 
+/// What a search begins with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Start {
+    /// The nominal structure.
+    AsGiven,
+    /// The same with friction and armature at every joint that has a motor.
+    WithFriction,
+}
+
+/// A structure with viscous and dry friction and armature at every joint that has a motor.
+fn with_friction(data: &Data, pool: &[Term], structure: &Structure) -> Structure {
+    let every = [Physics::Damper, Physics::Coulomb, Physics::Inertia];
+    let is_driven = |t: &&Term| t.at.joint().is_some_and(|j| !data.is_passive(j));
+    let missing = pool.iter().filter(|t| every.contains(&t.physics) && !structure.terms.iter().any(|own| own.is_like(t))).filter(is_driven);
+    Structure { terms: structure.terms.iter().chain(missing).cloned().collect(), ..structure.clone() }
+}
+
 /// Terms that a search has added, by index.
 pub fn added(structure: &Structure) -> Vec<usize> {
     (0..structure.terms.len()).filter(|i| structure.terms[*i].given.is_none()).collect()
@@ -163,7 +199,6 @@ pub fn added(structure: &Structure) -> Vec<usize> {
 
 /// Residuals of a structure that has plain friction and armature at every joint and free inertial parameters: what scatters beside them.
 fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
-    use crate::arms::physics::At;
     let mut rich = Structure { tolerance: TOLERANCES.len() - 1, ..nominal.clone() };
     for joint in 0..data.problem.joints.len() {
         for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Spring] {

@@ -1,6 +1,7 @@
 //! The result of a search, in the form of the verdict file.
 
 use crate::arms::base;
+use crate::arms::coupled::is_coupled_by_many;
 use crate::arms::error::ArmError;
 use crate::arms::fit::Fit;
 use crate::arms::inertial::{COUNT, NAMES};
@@ -190,7 +191,7 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
             sure = sure.min(0.5);
         }
         let numbers = numbers(data, best, *index);
-        let is_doubted = !falls(data, search, term) || may_be_nothing(&numbers);
+        let is_doubted = !falls(data, search, term) || may_be_nothing(&numbers) || is_coupled_by_many(&best.structure, term);
         if is_doubted {
             sure = sure.min(0.5);
         }

@@ -74,4 +74,8 @@ fn friction_that_grows_with_a_load_takes_a_load_that_changes() {
     let armature = number(finding(&found, "inertia", "calf"), "inertia");
     assert!(armature.ci95[0].unwrap() < 0.035 && 0.035 < armature.ci95[1].unwrap(), "{armature:?}");
     assert!(found.verdict.audit.iter().any(|r| r.what == "load" && r.place == "calf"), "{:?}", found.verdict.audit);
+    // All three joints' torques go together, which no leg's belts do: none is asserted.
+    let asserted = |f: &&Finding| f.physics.starts_with("coupl") && f.confidence > 0.5;
+    assert_eq!(found.verdict.findings.iter().find(asserted), None);
+    assert!(found.notes.iter().any(|note| note.contains("hip and thigh")), "{:?}", found.notes);
 }
