@@ -80,7 +80,7 @@ impl Report {
         let plural = |count: usize, word: &str| if count == 1 { format!("1 {word}") } else { format!("{count} {word}s") };
         match (wrong, notes) {
             (0, 0) => format!("{files}: nothing wrong was found"),
-            (0, notes) => format!("{files}: nothing wrong was found, {} to know", plural(notes, "thing")),
+            (0, notes) => format!("{files}: nothing wrong was found; {} to note", plural(notes, "thing")),
             (1, _) => format!("{files}: 1 thing is wrong"),
             (wrong, _) => format!("{files}: {wrong} things are wrong"),
         }

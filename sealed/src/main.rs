@@ -142,7 +142,7 @@ fn put(text: &str) -> Result<(), Failure> {
 }
 
 fn misused(what: impl std::fmt::Display) -> Failure {
-    Failure(format!("{what}; backdrive-sealed --help says what there is"), 2)
+    Failure(format!("{what}; see backdrive-sealed --help"), 2)
 }
 
 fn wrong(error: impl std::fmt::Display) -> Failure {

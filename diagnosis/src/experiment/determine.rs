@@ -28,7 +28,7 @@ pub fn excite<'a>(
 ) -> Result<Experiment, Reason> {
     let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.free.get(*j).is_some_and(|n| n.records.is_none())).collect();
     if numbers.is_empty() || values.len() != structure.free.len() || told.len() != values.len() {
-        return Err(Reason("there is no number to determine".to_string()));
+        return Err(Reason("there is no parameter to determine".to_string()));
     }
     let model = structure.model(problem, values).ok_or_else(|| Reason("the model cannot be simulated".to_string()))?;
     let planner = Planner::new(problem, noise_sd, budget)?;
@@ -45,7 +45,7 @@ pub fn excite<'a>(
     let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > tuning().experiment.open * whole(*j)).collect();
     if numbers.is_empty() {
         return Err(Reason(format!(
-            "the recordings determine all of these numbers with a standard deviation of {} % or less",
+            "the recordings determine all these parameters with a standard deviation of {} % or less",
             short(100.0 * tuning().experiment.open)
         )));
     }
@@ -68,7 +68,7 @@ pub fn excite<'a>(
     let Some((case, separation, after)) = best.filter(|g| g.1 >= least) else {
         let list = names.join(", ");
         return Err(Reason(format!(
-            "no excitation within the range of the recordings determines {list}: it takes larger amplitudes, another sensor or another input"
+            "no excitation within the range of the recordings determines {list}: use larger amplitudes, another sensor or another input"
         )));
     };
     let case = &cases[*case];
@@ -82,7 +82,7 @@ pub fn excite<'a>(
         }
     });
     let sentence = format!(
-        "Play {}: it determines {}, which the recordings leave open.",
+        "Play {}: it determines {}, which the recordings do not determine.",
         described(&model, &case.trial),
         accuracy.collect::<Vec<_>>().join(", ")
     );

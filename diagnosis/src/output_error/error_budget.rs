@@ -30,7 +30,7 @@ pub enum Source {
     Hold,
     /// Noise and rounding of a motion that drives the model: what another noise of the same size changes.
     DrivingMotion,
-    /// A velocity in steps, which is the difference of an encoder's counts: their mean over a sample in the place of the velocity at its middle.
+    /// A velocity computed from encoder counts: the mean over a sample period instead of the velocity at its middle.
     Differencing,
 }
 

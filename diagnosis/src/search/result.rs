@@ -84,7 +84,7 @@ impl Search {
 #[derive(Debug, thiserror::Error)]
 pub enum SearchError {
     /// The nominal model's motion leaves all bounds on the recordings.
-    #[error("the nominal model runs away on the recordings: check units, signs and sample time of the inputs")]
+    #[error("the nominal model diverges on the recordings: check units, signs and sample time of the inputs")]
     RunsAway,
     /// The refitted nominal model cannot be simulated.
     #[error("the refitted nominal model cannot be simulated: {0}")]

@@ -74,7 +74,7 @@ fn planned<'a, 's>(
         Word::Missing | Word::Unexplained | Word::Parameters | Word::NothingMissing => match next_effect(search, best) {
             Some(more) if !decision.at_floor => apart(&[more]),
             _ => determine(problem, search, decision, budget).map_err(|reason| match decision.at_floor {
-                true => Reason(format!("{reason}: nothing more has to be recorded for this model")),
+                true => Reason(format!("{reason}: no further recording is needed for this model")),
                 false => reason,
             }),
         },

@@ -65,11 +65,11 @@ fn told(model: &Model) -> Vec<String> {
     let what = if model.title.is_empty() { &model.name } else { &model.title };
     let mut all = vec![format!("Feed-forward of friction and the like: {what}.")];
     if !model.source.is_empty() {
-        all.push(format!("Source of the numbers: {}.", model.source.trim_end_matches('.')));
+        all.push(format!("Source of the parameters: {}.", model.source.trim_end_matches('.')));
     }
     all.extend(
         [
-            "Each function gives the effort that a motor adds along +q, so that what is listed in it is not felt.",
+            "Each function returns the effort along +q with which a motor compensates the listed terms.",
             "q: position, dq: velocity, load: force of what the joint drives, positive where it resists motion along +q.",
             "The sign of dq is tanh(dq/width): exact to rounding from 20 widths on. What moves together adds up.",
         ]

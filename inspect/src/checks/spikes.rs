@@ -84,7 +84,7 @@ fn told(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -
     let stream = recording.stream(signal);
     let (word, row) = (stream.row_word(), stream.row(first));
     let message = format!(
-        "{:?}: {} sample{} far off {} neighbours, the first in {word} {row}: {} where the neighbours are {} and {}",
+        "{:?}: {} sample{} far from {} neighbours, the first in {word} {row}: {} where the neighbours are {} and {}",
         signal.name,
         found.len(),
         if found.len() == 1 { " is" } else { "s are" },
@@ -98,5 +98,5 @@ fn told(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -
     finding.time_s = Some([stream.time(first), stream.time(first)]);
     let all: Vec<String> = found.iter().take(8).map(|i| stream.row(*i).to_string()).collect();
     let more = if found.len() > 8 { ", ..." } else { "" };
-    finding.todo(format!("replace or leave out {word} {}{more}: lost frames of the bus look so", all.join(", ")))
+    finding.todo(format!("replace or remove {word} {}{more}: lost bus frames look like this", all.join(", ")))
 }

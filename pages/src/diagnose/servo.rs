@@ -19,11 +19,11 @@ const POINTS: usize = 3000;
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 5] = [
-    ("free run", "the model simulated from the recorded commands alone, from where the joint stood at the first sample"),
+    ("free run", "a simulation from the recorded commands only, starting at the first recorded position"),
     ("nrmse", "root mean square of the error over the standard deviation of the recorded position"),
     ("second order", "delay, inertia, damping and offset alone, fitted to the same recordings"),
-    ("held out", "a recording that no fit has seen; where none is, each is simulated by a fit without it"),
-    ("force in rad", "over the servo's proportional gain: the angle between command and position that holds it"),
+    ("held out", "a recording that no fit uses; if there is none, each recording is simulated with a fit to the others"),
+    ("force in rad", "over the servo's proportional gain: the angle between command and position that balances it"),
 ];
 
 /// The report: `name` is the set, for the title, and `steps` what to do next.
@@ -60,7 +60,7 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         })
         .collect();
     match rows.is_empty() {
-        true => page.text("Nothing beside delay, second order and offset."),
+        true => page.text("Nothing in addition to delay, second order and offset."),
         false => page.table(table(["where", "what", "numbers", "confidence", "or instead"], rows)),
     };
 
@@ -90,13 +90,13 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         drawn(&mut page, &problem.joints[answer.joint].name, answer);
     }
 
-    page.section("What these recordings do not tell apart");
+    page.section("What these recordings do not separate");
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
         .flat_map(|j| j.shared.iter().map(|s| vec![j.joint.clone(), sentence(&s.sentence), sentence(&s.separated_by)]))
         .collect();
-    page.table(table(["joint", "what is shared", "what tells them apart"], rows));
+    page.table(table(["joint", "what is shared", "what separates them"], rows));
 
     page.section("Numbers");
     let rows: Vec<Vec<String>> = servo
@@ -141,7 +141,7 @@ fn drawn(page: &mut Page, joint: &str, answer: &Answer) {
             .series(line("second order", &error(&judged.refit), Colour::Nth(0), Dash::Dashed))
             .series(line("diagnosed", &error(&judged.diagnosed), Colour::Nth(1), Dash::Solid));
         let (share, mae) = scored(&judged.diagnosed, &record.position);
-        let how = if answer.is_held_out { "no fit has seen it" } else { "simulated by a fit without it" };
+        let how = if answer.is_held_out { "held out" } else { "simulated with a fit to the other recordings" };
         page.figure(
             Figure::stacked([upper, lower]),
             &format!("{joint} in {}: {how}; nrmse {share:.3}, mean error {} mrad.", file_name(&record.name), number(1e3 * mae)),

@@ -21,7 +21,7 @@ const WINDOW_S: f64 = 8.0;
 
 /// The page.
 pub fn page(report: &Report, recordings: &[Recording]) -> Page {
-    let mut page = Page::new("Is the recording right?");
+    let mut page = Page::new("Checks of the recording");
     let wrong = report.wrong().count();
     page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
     if !report.findings.is_empty() {
@@ -56,7 +56,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         if !drawn.is_empty() {
             page.figure(Figure::beside(drawn), "Command and position where the command moves most.");
         }
-        page.text("A dash stands where the motion does not show it. Droop, dead band and limit of speed are in the position's SI unit.");
+        page.text("A dash: not identifiable from this motion. Droop, dead band and speed limit are in the position's SI unit.");
     }
     pictures(&mut page, report, recordings);
     page.section("Signals");
@@ -198,14 +198,11 @@ fn busiest(recording: &Recording, signal: &Signal) -> (f64, f64) {
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 7] = [
-    (
-        "lag",
-        "by how much a position is late behind its command in this motion; a response that is no pure delay has another lag at another speed",
-    ),
-    ("-3 dB", "the frequency at which the response falls to 71 % of its size at low frequencies; >= where the motion goes no further"),
-    ("droop", "steady error while the command is held: what weight and friction bend the servo by"),
-    ("dead band", "steady position approached from above minus from below"),
+    ("lag", "the time by which a position lags its command in this motion; if the response is not a pure delay, the lag depends on speed"),
+    ("-3 dB", "the frequency at which the response falls to 71 % of its low-frequency value; >= if the motion has no higher frequencies"),
+    ("droop", "steady error while the command is constant, due to weight and friction"),
+    ("dead band", "steady position after an approach from above minus that from below"),
     ("rectified", "logged without its sign"),
     ("jitter", "standard deviation of the steps of the clock"),
-    ("sure", "probability that the finding is so"),
+    ("sure", "probability that the finding is right"),
 ];

@@ -24,7 +24,7 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         return;
     };
     if let Some(cannot) = &frequency.cannot_tell {
-        page.note(&format!("The loop cannot be told from this recording: {}.", cannot.reason.trim_end_matches('.')));
+        page.note(&format!("The loop cannot be identified from this recording: {}.", cannot.reason.trim_end_matches('.')));
     }
     let gain = found.gain.product();
     let axes = frequency.levels.iter().flat_map(|l| l.axes.iter().map(|a| a.name.as_str()));
@@ -36,9 +36,10 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     }
     if let Some(m) = &found.margins {
         let whose = if found.margins_are_of_the_edge() {
-            "At the gain asked, by the measured response of the worst loop at the worst amplitude."
+            "At the requested gain, from the measured response of the least stable loop at the worst amplitude."
         } else {
-            "At the gain asked, by the measured response alone: another edge, lower or known better, is the one to act on (above), and these margins are not to it."
+            "At the requested gain, from the measured response alone. The stability limit to use (above) is lower or known better; these \
+                margins do not refer to it."
         };
         let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{} {unit}", number(v)));
         page.table(
@@ -51,26 +52,28 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     if several && frequency.levels.iter().any(|l| !l.loci.is_empty()) {
         page.figure(
             loci(frequency, gain),
-            "All axes together: the loop is stable if none of these loci encircles +1. No discs: see each axis below.",
+            "All axes together: the loop is stable if none of these loci encircles +1. Uncertainty is shown for each axis below.",
         );
     }
     for name in &names {
         let found: Vec<(&LevelEstimate, &AxisEstimate)> =
             frequency.levels.iter().filter_map(|l| Some((l, l.axes.iter().find(|a| a.name == **name)?))).collect();
         if found.iter().all(|(_, a)| !a.told.iter().any(|t| *t)) {
-            page.text(&format!("{name}: no line of the loop stands out of its uncertainty."));
+            page.text(&format!("{name}: no line of the loop exceeds its uncertainty."));
             continue;
         }
         let title = if several { format!("{name}: ") } else { String::new() };
         page.figure(
-            nyquist(&found, gain, &title),
-            "L, once round the loop, scaled to the gain asked, the colour of the curve with the lowest edge is its frequency; the closed loop is F_f = d + L F_f, so +1 is the critical \
-             point. The discs, drawn near +1 only, hold 95 % each. Only lines at which L stands out of its uncertainty are drawn.",
-        );
-        page.figure(
             bode(&found, gain, &title),
-            "The loop is on its edge where |L| = 1 at a phase of 0° (or a whole turn). The band holds 95 %.",
+            "The loop is at its stability limit where |L| = 1 at a phase of 0° (or a multiple of 360°). Band: 95 % interval.",
         );
+        page.details(&format!("{title}Nyquist plot"), |inside| {
+            inside.figure(
+                nyquist(&found, gain, &title),
+                "Open-loop response L at the requested gain. The closed loop is F_f = d + L F_f, so +1 is the critical point. Colour: \
+                 frequency. Discs: 95 % confidence regions near +1. Lines within their uncertainty are omitted.",
+            );
+        });
     }
     page.details("How the response was estimated", |inside| {
         inside.text(&frequency.method);
@@ -97,7 +100,7 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         let p = &frequency.provenance;
         inside.text(&format!("Master: {}; canceller: {}; slave and environment: {}.", p.master, p.canceller, p.slave));
         if let Some(delay) = frequency.delays.loop_s {
-            inside.text(&format!("Delay of the loop beside its devices: {}.", si(delay, "s")));
+            inside.text(&format!("Delay of the loop outside its devices: {}.", si(delay, "s")));
         }
         let r = &frequency.rows;
         inside.text(&format!(
@@ -209,7 +212,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
         phase = phase.series(Series::line("", &level.hz, &angles).colour(Colour::Nth(i)));
         coherence = coherence.series(Series::line("", &level.hz, &axis.coherence).colour(Colour::Nth(i)));
         if let Some(hz) = axis.edge.frequency_hz.filter(|hz| *hz > 0.0 && first == Some(i)) {
-            magnitude = magnitude.vertical(hz, &format!("edge at {}", si(hz, "Hz")), Tone::Bad);
+            magnitude = magnitude.vertical(hz, &format!("limit at {}", si(hz, "Hz")), Tone::Bad);
             phase = phase.vertical(hz, "", Tone::Bad);
         }
     }

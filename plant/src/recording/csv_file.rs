@@ -149,7 +149,7 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
         RecordingError::NotRising { index, before, now, .. } => {
             let mut message = format!("time does not rise: {now} s after {before} s");
             if now < before {
-                message.push_str("; of a file with several runs, set.toml takes one with where or rows");
+                message.push_str("; from a file with several runs, set.toml selects one with where or rows");
             }
             FileError::at(&name, lines.get(index).copied().unwrap_or(1), &time.heading, message)
         }
@@ -193,7 +193,7 @@ impl Headings<'_> {
             (None, _) => {
                 let mut message = tomlfile::unknown("column", heading, self.headings.iter());
                 if heading == signal && asked_by.is_empty() {
-                    message.push_str(&format!(" ([columns] {signal} = \"...\" says which column it is)"));
+                    message.push_str(&format!(" ([columns] {signal} = \"...\" names the column)"));
                 }
                 Err(FileError::at(self.name, self.line, asked_by, message))
             }
@@ -206,7 +206,7 @@ impl Headings<'_> {
             None => signal,
             Some(Source::Column(heading)) => heading,
             Some(Source::Topic { topic, .. }) => {
-                let message = format!("[columns] takes \"{signal}\" from the topic {topic}, and a CSV file has columns");
+                let message = format!("[columns] reads \"{signal}\" from the topic {topic}, but a CSV file has columns");
                 return Err(FileError::at(self.name, self.line, "", message));
             }
         };
@@ -222,7 +222,7 @@ impl Headings<'_> {
                         self.name,
                         self.line,
                         &heading,
-                        format!("{message}; or say scale for \"{signal}\" under [columns] of set.toml"),
+                        format!("{message}; or set scale for \"{signal}\" under [columns] of set.toml"),
                     )
                 })?;
                 (unit.map_or(1.0, |u| u.factor), unit)

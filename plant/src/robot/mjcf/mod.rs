@@ -83,7 +83,7 @@ fn left_aside(section: Element, remarks: &mut Remarks) -> Result<(), FileError> 
         "contact" => ("contacts between bodies are not computed", true),
         "deformable" => ("what bends is not computed", true),
         "asset" | "visual" | "statistic" | "size" | "custom" | "keyframe" => ("not read: it does not move", false),
-        "sensor" => ("not read: what is measured is an output of the model file", false),
+        "sensor" => ("ignored: measured signals are outputs of the model file", false),
         "extension" => ("plugins are not read", true),
         _ => ("not known, and not read", true),
     };
