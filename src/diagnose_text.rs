@@ -101,7 +101,7 @@ fn refit(found: &Diagnosis) -> String {
     moved.sort_by(|a, b| b.moved_sd.unwrap_or(0.0).abs().total_cmp(&a.moved_sd.unwrap_or(0.0).abs()));
     let most = moved.first().filter(|r| r.moved_sd.is_some_and(|s| s.abs() > 2.0)).map_or(String::new(), |r| {
         let given = r.given.unwrap_or(f64::NAN);
-        format!("; {} moved most, {} to {} ({:.0} sd)", r.name, number(given), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
+        format!("; {} moved most, {} to {} ({:.0} sd)", r.name, si(given, &r.unit), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
     });
     format!(
         "residual {} times {noise} as given, {} with the parameters refitted{most}; {}",

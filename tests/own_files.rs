@@ -297,7 +297,7 @@ fn protobuf_without_its_descriptors_is_refused_in_one_line_by_all() {
     std::fs::create_dir_all(place.path("mine")).unwrap();
     foreign(&place, "mine/pb.mcap", "protobuf", "protobuf", |_| vec![9, 0, 0, 0, 0, 0, 0, 240, 63]);
     let says =
-        ["topic /joint_states is not read: its messages are protobuf", "its schema is not a FileDescriptorSet", "write its values as CSV"];
+        ["topic /joint_states is not read: its messages are protobuf", "its schema is not a FileDescriptorSet", "Write its values as CSV"];
     let told = place.backdrive(&["bag", "info", "mine/pb.mcap"]);
     assert!(told.stdout.contains("NOT READ") && says.iter().all(|words| told.stdout.contains(words)), "{told:?}");
     assert!(place.backdrive(&["bag", "info", "mine/pb.mcap", "--json"]).json()["topics"][0]["unread"].as_str().unwrap().contains(says[0]));

@@ -47,9 +47,9 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
         }
         for group in &summary.worth {
             page.text(&format!(
-                "{}, {} cases: median of the stable gain relative to the best available without a diagnosis (no canceller, second order, \
-                 linear refitted); cases below no canceller; and the gain relative to the better linear canceller alone, which is often \
-                 far below none.{}",
+                "{}, {} cases: median of the stable gain, relative to the best available without a diagnosis (no canceller, second order, \
+                 linear refitted). Then: cases below no canceller, and the gain relative to the better linear canceller alone, which is \
+                 often far below none.{}",
                 group.kind,
                 group.cases,
                 group.recovery_s.map_or_else(String::new, |s| format!(
@@ -162,8 +162,8 @@ fn one(page: &mut Page, case: &Case) {
         page.table(by_hand(case));
         if let Some(time) = case.recovery_s {
             page.text(&format!(
-                "After a change of the grip, at half the stable gain of the changing hand, the loop with the hand \
-                estimated settles in {time:.2} s (median); the hand's own motion takes 0.15 s of it."
+                "After a change of the grip, at half the stable gain of the changing hand, the loop with the hand estimated settles in \
+                {time:.2} s (median). The hand's own motion takes 0.15 s of it."
             ));
         }
         page.details("What limits each stable range", |inside| {

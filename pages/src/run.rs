@@ -101,8 +101,6 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
     todo(&mut page, steps);
-    page.table(facts(done, graph));
-
     let session = heard.signals.session();
     page.section("Signals");
     if session.is_empty() {
@@ -111,10 +109,10 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     for axis in &session.axes {
         signals(&mut page, axis, &session);
     }
-    page.section("Timing and losses");
-    timing(&mut page, done, graph, heard);
-    page.section("Events");
-    events(&mut page, done, graph, heard);
+    page.section("Run");
+    page.table(facts(done, graph));
+    page.details("Timing and losses", |inside| timing(inside, done, graph, heard));
+    page.details("Events", |inside| events(inside, done, graph, heard));
     ending(&mut page, &TERMS);
     page
 }

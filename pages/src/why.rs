@@ -17,7 +17,8 @@ pub const NO_CAUSE: &str = "not known: the recording contains no model of the lo
 pub fn page(found: &Answer, session: &Session, tries: &[Step], steps: &[Step]) -> Page {
     let name = std::path::Path::new(&found.bag).file_name().map_or(found.bag.clone(), |n| n.to_string_lossy().into_owned());
     let mut page = Page::new(&format!("Cause of the oscillation: {name}"));
-    page.lead(tone(found), &lead(found));
+    page.lead(tone(found), &crate::stability::spelled(&lead(found)));
+    todo(&mut page, steps);
     if let Some(beneath) = &found.beneath {
         page.text(&format!("Without that limit: {beneath}."));
     }
@@ -27,26 +28,27 @@ pub fn page(found: &Answer, session: &Session, tries: &[Step], steps: &[Step]) -
              below are less certain.",
         );
     }
-    todo(&mut page, steps);
     pictures(&mut page, found, session);
     page.section("Causes");
     causes(&mut page, found);
-    page.section("Remedies");
-    remedies(&mut page, found, tries);
-    page.section("Differences between the recording and its graph");
-    if found.differs.is_empty() {
-        page.text("None: every node responds to its recorded inputs as the graph states.");
-    }
-    found.differs.iter().for_each(|d| {
-        page.text(&format!("{d}."));
+    page.section("Details");
+    page.details("Remedies", |inside| remedies(inside, found, tries));
+    page.details("Differences between the recording and its graph", |inside| {
+        if found.differs.is_empty() {
+            inside.text("None: every node responds to its recorded inputs as the graph states.");
+        }
+        found.differs.iter().for_each(|d| {
+            inside.text(&format!("{d}."));
+        });
     });
     if !found.events.is_empty() {
-        page.section("Events of the nodes");
         let mut table = Table::new(["event", "times"]);
         for (kind, count) in &found.events {
             table.push([kind.replace('_', " "), count.to_string()]);
         }
-        page.table(table);
+        page.details("Events of the nodes", |inside| {
+            inside.table(table);
+        });
     }
     if !found.notes.is_empty() {
         page.details("Notes", |inside| {
@@ -70,7 +72,10 @@ fn tone(found: &Answer) -> Tone {
 fn lead(found: &Answer) -> String {
     let mut text = format!("{}, at μλ = {}.", large(&found.happens), number(found.gain));
     if let Some(first) = found.causes.first() {
-        text += &format!(" The likeliest cause is {} (confidence {}).", first.kind.words(), percent(first.confidence));
+        text += &format!(" Most likely cause: {} (confidence {}).", first.kind.words(), percent(first.confidence));
+    }
+    if let Some(remedy) = found.remedies.first().filter(|r| r.stops && found.happening.is_trouble()) {
+        text += &format!(" First remedy: {}.", remedy.text);
     }
     text
 }
@@ -147,8 +152,8 @@ fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
         "other grips, higher gain",
         "force left",
         "motion left",
-        "motion or force beyond the recording",
-        "command",
+        "beyond the recording",
+        "options of the command",
     ]);
     let yes = |is: bool| if is { "yes" } else { "no" }.to_string();
     for (index, remedy) in found.remedies.iter().enumerate() {
@@ -160,10 +165,15 @@ fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
             percent(remedy.force_kept),
             percent(remedy.motion_kept),
             remedy.throws.as_ref().map_or_else(|| "no".to_string(), ToString::to_string),
-            tries.get(index).and_then(Step::pasted).unwrap_or_default(),
+            tries.get(index).and_then(Step::pasted).map(|command| options(&command)).unwrap_or_default(),
         ]);
     }
     page.table(table);
+}
+
+/// A command without its program, verb and bag.
+fn options(command: &str) -> String {
+    command.find(" --").map_or(command, |at| &command[at + 1..]).to_string()
 }
 
 /// The terms of the page.

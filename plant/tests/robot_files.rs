@@ -80,7 +80,7 @@ fn a_urdf_is_refused_in_a_sentence_with_its_line() {
     refused(&bare, "arm.xml:15: joint \"extension\": nothing that it moves has inertia: give link \"slider\"");
     refused(
         &with("<dynamics", "<mimic joint=\"extension\"/><dynamics"),
-        "ties this joint to joint \"extension\", which a tree cannot represent; remove <mimic>",
+        "ties this joint to joint \"extension\", which a tree cannot represent. Remove <mimic>",
     );
     refused(
         &with("type=\"continuous\"", "type=\"floating\""),

@@ -326,7 +326,7 @@ fn scale(problem: &Problem, answers: &[Answer]) -> String {
             known payload would give N m"
             .to_string(),
         false => format!(
-            "torques in N m are scaled by the masses of the robot file and the droop at {}, and are as accurate as those masses; other \
+            "torques in N m are scaled by the masses of the robot file and the droop at {}, and are as accurate as those masses. Other \
              forces are angles, divided by the proportional gain (rad)",
             known.join(", ")
         ),

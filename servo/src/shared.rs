@@ -74,7 +74,7 @@ fn told(one: &str, other: &str) -> (&'static str, &'static str) {
     if is("saturation", "speed_limit") || is("saturation", "acceleration_limit") || is("speed_limit", "acceleration_limit") {
         return (
             "limits of torque, speed and acceleration all slow down large steps",
-            "command steps of 0.1, 0.3 and 1 rad: a speed limit gives ramps of one slope, an acceleration limit gives slopes that grow \
+            "command steps of 0.1, 0.3 and 1 rad. A speed limit gives ramps of one slope, an acceleration limit gives slopes that grow \
                 with the step, a torque limit depends on the load",
         );
     }

@@ -21,7 +21,7 @@ pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
             if first == second { format!("{second}: is given twice") } else { format!("{second}: is the same recording as {first}") };
         if held != first_held {
             return Err(SetError::new(format!(
-                "{which}, once to be fitted and once held out; a recording used in a fit cannot test it: hold out another recording, or \
+                "{which}, once to be fitted and once held out. A recording used in a fit cannot test it: hold out another recording, or \
                     name it once"
             )));
         }
@@ -38,7 +38,7 @@ pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
     for held in &problem.held_out {
         if let Some(fitted) = problem.fit.iter().find(|fitted| same(fitted, held)) {
             return Err(SetError::new(format!(
-                "{}: holds the same samples as {}, once to be fitted and once held out; a recording used in a fit cannot test it: hold \
+                "{}: holds the same samples as {}, once to be fitted and once held out. A recording used in a fit cannot test it: hold \
                  out another recording, or name it once",
                 held.name, fitted.name
             )));
@@ -93,7 +93,7 @@ pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], ha
             false => format!("did you mean --grip {prefix}.toml (the grip that held the device), or a model that holds the hand?"),
         };
         return Err(SetError::new(format!(
-            "{file}: {name}, a motion of the hand, is in the recordings, but the model has no input for it: its inputs are {}; {hint} \
+            "{file}: {name}, a motion of the hand, is in the recordings, but the model has no input for it. Its inputs are {}; {hint} \
              --ignore-signal {name}, or ignore = [\"{name}\"] in set.toml, continues without it",
             takes.join(", ")
         )));

@@ -14,8 +14,10 @@ The hidden plant is a separate program: `cargo build --release --workspace` buil
 first: its SHA-256 is printed before anything is recorded, and only that program opens it until the verdict is written. Of several cases,
 every fifth conceals nothing, and in every second one the hand is not measured; its search may take 2.5 times as long. Each case has a
 folder with sealed/, session/ (bags and set), diagnosis/ and logs; proof.json and proof.html cover all cases.
-Exit code 0 if all effects were found by family and place, with no false alarm, no canceller of the diagnosis is worse than none with any
-hand, and every live run agrees with the stability limits; 1 if not, 2 usage, 3 a file is wrong, 5 a file cannot be written,
+Exit code 0 if all effects were found by family and place without a false alarm, no canceller of the diagnosis is worse than none,
+and every live run agrees with the stability limits.
+
+Other exit codes: 1 if not, 2 usage, 3 a file is wrong, 5 a file cannot be written,
 6 a node failed, 130 interrupted.";
 
 /// `backdrive prove`

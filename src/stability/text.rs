@@ -85,17 +85,17 @@ fn edge(found: &Answer, lines: &mut Lines) {
                 None => String::new(),
             };
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
-            lines.put("edge", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
+            lines.put("limit", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
         }
         (None, Some(_)) if found.limited_from.is_some() => {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             let from = found.limited_from.unwrap_or_default();
             lines.put(
-                "edge",
+                "limit",
                 format!("from mu*lambda = {from:.3} on a clamp acts or the master leaves its travel, before any oscillation{by}{recorded}"),
             );
         }
-        (None, Some(least)) => lines.put("edge", format!("none up to mu*lambda = {least:.3}{recorded}")),
+        (None, Some(least)) => lines.put("limit", format!("none up to mu*lambda = {least:.3}{recorded}")),
         _ => {}
     }
 }
@@ -177,7 +177,7 @@ fn run_again(found: &Answer, lines: &mut Lines) {
     }
     match (&found.resimulated, &found.no_resimulation) {
         (Some(again), _) => {
-            lines.put("re-run", format!("{}; {}", again.outcome, again.edge.reason));
+            lines.put("re-sim", format!("{}; {}", again.outcome, again.edge.reason));
             let grips: Vec<String> = again
                 .grips
                 .iter()
@@ -193,7 +193,7 @@ fn run_again(found: &Answer, lines: &mut Lines) {
             lines.put("energy", again.energy.reason.clone());
         }
         (None, Some(why)) => {
-            lines.put("re-run", format!("not possible: {why}"));
+            lines.put("re-sim", format!("not possible: {why}"));
             lines.put("energy", found.recorded_energy.reason.clone());
         }
         _ => {}

@@ -96,8 +96,8 @@ impl Asked {
                 Ok(found) => {
                     let worst = |values: &[f64]| values.iter().fold(0.0_f64, |a, b| a.max(*b));
                     session.notes.push(format!(
-                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of x_m's range; \
-                         dry friction hides where it was within {:.2} mm",
+                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of \
+                         x_m's range. Dry friction makes its position uncertain by {:.2} mm",
                         100.0 * worst(&found.residual),
                         1e3 * worst(&found.ambiguity)
                     ));

@@ -70,7 +70,7 @@ pub(crate) fn read(reader: &Reader, graph: &Graph, place: &Place, most: u64) -> 
     let seconds = |steps: u64| steps as f64 * session.period_s;
     let from = (chosen * most).max(first);
     session.notes.push(format!(
-        "the recording of {:.0} s is too long to analyse at once: its motion is judged in {} parts; frequency response, models and \
+        "the recording of {:.0} s is too long to analyse at once: its motion is judged in {} parts. Frequency response, models and \
          re-simulation use {:.0} s to {:.0} s, {}",
         seconds(rows as u64),
         pieces.found.len(),

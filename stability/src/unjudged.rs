@@ -58,8 +58,8 @@ impl Unjudged {
             }
             Unjudged::NoFeedback => "Judge a gain above 0 (`backdrive stability BAG --gain 0.3`), or run with --lambda above 0.",
             Unjudged::NoHold => {
-                "Let the hand hold still while the loop is closed (in contact, where only contact closes it) for a second or two: half a second at \
-                 least, and 16 steps beyond the first 0.15 s."
+                "Let the hand hold still while the loop is closed (in contact, where only contact closes it) for one or two seconds. The \
+                 minimum is 0.5 s, and 16 steps after the first 0.15 s."
             }
             Unjudged::NotShaken => "Move faster, reverse sharply and touch something, to excite the pair above 8 Hz.",
             Unjudged::NoDecay => "Record longer, with more sharp contacts: ten seconds or more.",

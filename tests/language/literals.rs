@@ -1,10 +1,14 @@
 //! The string literals of a Rust file that a user may read: those with a space, outside of tests.
 
-/// String literals with the line of each, from 1. Continued lines are joined, and holes such as `{name}` are code.
+/// String literals with the line of each, from 1. Continued lines are joined. Holes such as `{name}` and indented lines are code.
 pub fn messages(rust: &str) -> Vec<(usize, String)> {
     let own = rust.find("\n#[cfg(test)]\nmod ").filter(|at| rust[*at + 1..].lines().nth(1).is_some_and(|line| line.ends_with('{')));
     let found = literals(&rust[..own.unwrap_or(rust.len())]);
-    found.into_iter().filter(|(_, text)| text.trim().contains(' ')).map(|(line, text)| (line, without_holes(&text))).collect()
+    found
+        .into_iter()
+        .filter(|(_, text)| text.trim().contains(' '))
+        .map(|(line, text)| (line, without_holes(&without_code(&text))))
+        .collect()
 }
 
 /// All string literals of a file, in their order.
@@ -58,6 +62,12 @@ fn joined(text: &str) -> String {
     let mut parts = text.split("\\\n");
     let first = parts.next().unwrap_or_default().to_string();
     parts.fold(first, |all, part| all + part.trim_start()).replace("\\n", "\n").replace("\\\"", "\"")
+}
+
+/// A text without its lines of commands, which are indented.
+fn without_code(text: &str) -> String {
+    let lines: Vec<&str> = text.split('\n').map(|line| if line.starts_with("  ") { "" } else { line }).collect();
+    lines.join("\n")
 }
 
 /// A text with `` `x` `` for each hole of a format, which is code.

@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 /// Most words of a sentence.
 const MOST_WORDS: usize = 40;
 
+/// Most words of a sentence in a message.
+const MOST_WORDS_OF_A_MESSAGE: usize = 30;
+
 /// Words and phrases that `docs/glossary.md` has a term of the field for, or that a plainer word replaces.
 const BANNED: &[&str] = &[
     "a physics",
@@ -74,7 +77,7 @@ const COMMITTED: &[(Kind, Group, usize)] = &[
     (Kind::LongSentence, Group::DocComments, 0),
     (Kind::BannedWord, Group::Pages, 0),
     (Kind::BannedWord, Group::DocComments, 0),
-    (Kind::LongSentence, Group::Messages, 14),
+    (Kind::LongSentence, Group::Messages, 20),
     (Kind::BannedWord, Group::Messages, 3),
 ];
 
@@ -106,7 +109,7 @@ struct Found {
 impl Kind {
     fn find(self, group: Group, sentence: &Sentence) -> Vec<Found> {
         match self {
-            Kind::LongSentence if sentence.words.len() > MOST_WORDS => {
+            Kind::LongSentence if sentence.words.len() > if group == Group::Messages { MOST_WORDS_OF_A_MESSAGE } else { MOST_WORDS } => {
                 let begin: Vec<&str> = sentence.words.iter().take(8).map(|(word, _)| word.as_str()).collect();
                 vec![Found { line: sentence.line, size: sentence.words.len(), text: begin.join(" ").replace('\u{1}', "`...`") }]
             }

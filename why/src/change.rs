@@ -189,7 +189,7 @@ impl Change {
 impl std::fmt::Display for Change {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Change::Gain { lambda, factor } => write!(f, "lower lambda to {lambda:.3} ({:.0} % of it)", 100.0 * factor),
+            Change::Gain { lambda, factor } => write!(f, "lower lambda to {lambda:.3} ({:.0} % of the recorded value)", 100.0 * factor),
             Change::Canceller { of, model: None, .. } => write!(f, "{of}"),
             Change::Canceller { of, high_pass_hz, .. } if *high_pass_hz > 0.0 => {
                 write!(f, "use {of} in the canceller, only above {high_pass_hz:.1} Hz (high_pass_hz)")

@@ -97,8 +97,8 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
     // The rate from the drive beside the derivative.
     let (mut off, mut size, mut product, mut own) = (0.0, 0.0, 0.0, 0.0);
     for motion in &data.motions {
-        let Some(told) = &motion.told[j] else { continue };
-        for (a, b) in told.iter().zip(&motion.velocity[j]) {
+        let Some(recorded) = &motion.recorded_velocity[j] else { continue };
+        for (a, b) in recorded.iter().zip(&motion.velocity[j]) {
             off += (a - b) * (a - b);
             size += b * b;
             product += a * b;

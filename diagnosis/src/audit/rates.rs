@@ -31,7 +31,7 @@ pub fn rates(problem: &Problem) -> Result<(), String> {
             "its time looks like {word}: write t = {{ column = \"t\", scale = {unit:e} }} under [columns] of a set.toml for these files, \
                 or convert it"
         ),
-        None => "the input between the slow samples is unknown: record all at one rate, diagnose them separately, or set mixed_rates = \
+        None => "the input between the slow samples is unknown. Record all at one rate, diagnose them separately, or set mixed_rates = \
                  true in set.toml if the slow input really is held between samples"
             .to_string(),
     };
@@ -53,8 +53,8 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
         && left < 1.0 - tuning().recordings.unit_correlates * tuning().recordings.unit_correlates;
     better.then(|| {
         format!(
-            "{}: has a sample every {:.4} s, which does not fit the model; read as {word} it explains {:.0} % of the motion's variance \
-             instead of {:.0} %: write t = {{ column = \"t\", scale = {unit:e} }} under [columns] of set.toml, or convert the column to \
+            "{}: has a sample every {:.4} s, which does not fit the model. Read as {word} it explains {:.0} % of the motion's variance \
+             instead of {:.0} %. Write t = {{ column = \"t\", scale = {unit:e} }} under [columns] of set.toml, or convert the column to \
              seconds",
             file_name(&record.name),
             record.period,

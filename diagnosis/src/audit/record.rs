@@ -26,7 +26,7 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
         if let (InputKind::Motion, Some(step)) = (input.kind, crate::recordings::noise::step_of(samples)) {
             let text = format!(
                 "drives the model and has a resolution of {step:.4e}: after two differentiations each step is an acceleration of {:.1e} \
-                 for one sample; its effect on the forces is counted as force noise",
+                 for one sample. Its effect on the forces is counted as force noise",
                 step / (record.period * record.period)
             );
             add(all, Weight::Caution, record, &input.name, "encoder", text);
@@ -118,7 +118,7 @@ fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut V
                 && share < tuning().recordings.quiet_top
             {
                 let text = "has no power in the upper part of its band, not even noise: it was low-pass filtered before recording, or \
-                            simulated; delay and bandwidth found here may belong to the filter"
+                            simulated. A delay or bandwidth found here may belong to the filter"
                     .to_string();
                 add(all, Weight::Caution, record, name, "filtered", text);
             }

@@ -21,7 +21,7 @@ use crate::output_error::candidate::{key_of, sort};
 use crate::output_error::effort::Effort;
 use crate::output_error::error_budget::error_budget;
 use crate::output_error::evaluator::Evaluator;
-use crate::output_error::hold::told;
+use crate::output_error::hold::evidence;
 use crate::output_error::work::{Budget, Limit};
 use crate::physics;
 use crate::recordings::problem::Problem;
@@ -94,7 +94,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
         t.taken = single.map(|c| 1.0 - c.fit.cost / refitted.fit.cost);
     }
-    let holds = told(evaluator, &refitted);
+    let holds = evidence(evaluator, &refitted);
     Ok(Search {
         errors: error_budget(evaluator, &refitted, &holds),
         holds,

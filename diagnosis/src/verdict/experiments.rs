@@ -91,8 +91,8 @@ fn is_kin(best: &Candidate, other: &Candidate) -> bool {
 fn determine<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let best = decision.best;
     let all: Vec<usize> = (0..best.structure.free.len()).collect();
-    let told: Vec<f64> = all.iter().map(|number| decision.spread.half(*number) / NORMAL_975).collect();
-    excite(problem, &best.structure, &best.fit.values, &all, &told, &search.noise_sd, budget)
+    let deviations: Vec<f64> = all.iter().map(|number| decision.spread.half(*number) / NORMAL_975).collect();
+    excite(problem, &best.structure, &best.fit.values, &all, &deviations, &search.noise_sd, budget)
 }
 
 /// An experiment as the verdict has it; its file is written under [`EXPERIMENT_FILE`].

@@ -20,7 +20,7 @@ pub fn check(recording: &mut Recording, out: &mut Vec<Finding>) {
     for place in 0..recording.signals.len() {
         let found = places(&recording.signals[place]);
         if let Some(first) = found.first() {
-            out.push(told(recording, &recording.signals[place], *first, &found));
+            out.push(finding(recording, &recording.signals[place], *first, &found));
             mend(recording, place, &found);
         }
     }
@@ -79,7 +79,7 @@ fn places(signal: &Signal) -> Vec<usize> {
     if found.len() as f64 > (FEW * values.len() as f64).max(1.0) { Vec::new() } else { found }
 }
 
-fn told(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -> Finding {
+fn finding(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -> Finding {
     let values = &signal.values;
     let stream = recording.stream(signal);
     let (word, row) = (stream.row_word(), stream.row(first));

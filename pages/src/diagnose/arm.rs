@@ -31,31 +31,31 @@ pub fn page(shown: &Shown) -> Page {
     let held = !problem.held_out.is_empty();
     let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
-    page.text(&summary(verdict, held));
     todo(&mut page, steps);
+    page.text(&summary(verdict, held));
     for note in *notes {
         page.note(&sentence(note));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(4) {
         page.warning(&sentence(&format!("{}: {}", remark.place, remark.message)));
     }
-    tables::findings(&mut page, verdict);
     page.section("What remains of each joint's torque");
     figures::remaining(&mut page, verdict, held);
-    tables::joints(&mut page, verdict);
+    tables::findings(&mut page, verdict);
+    page.details("Shares of the torque of each joint", |inside| tables::joints(inside, verdict));
     page.section(if held { "Torque on a held-out log" } else { "Torque on a log, as fitted" });
     figures::torque(&mut page, &found.drawn);
     page.section("Friction of each joint");
     figures::friction(&mut page, &found.drawn);
-    page.section("Inertial parameters");
-    tables::base_parameters(&mut page, verdict);
-    tables::moved(&mut page, verdict);
     page.section("Next recording");
     figures::next(&mut page, verdict, &found.drawn);
-    page.section("All hypotheses");
-    tables::tried(&mut page, &found.tried);
-    page.section("Checks of the logs");
-    tables::audit(&mut page, problem, verdict);
+    page.section("Details");
+    page.details("Inertial parameters", |inside| {
+        tables::base_parameters(inside, verdict);
+        tables::moved(inside, verdict);
+    });
+    page.details("All hypotheses", |inside| tables::tried(inside, &found.tried));
+    page.details("Checks of the logs", |inside| tables::audit(inside, problem, verdict));
     ending(&mut page, &TERMS);
     page
 }

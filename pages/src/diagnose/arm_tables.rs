@@ -23,7 +23,7 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
     let replacing = all.iter().any(|f| !f.replaces.is_empty());
     let mut headers = vec!["missing", "where", "numbers"];
     headers.extend(replacing.then_some("in place of"));
-    headers.extend(["confidence", "or instead"]);
+    headers.extend(["confidence", "alternatives"]);
     let simulated = all.iter().any(|f| f.closed_loop.is_some());
     headers.extend(simulated.then_some("closed loop: correction with it, of that without"));
     let mut table = Table::new(headers);

@@ -40,7 +40,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     if !drawn && let Some(first) = location.ranking.first() {
         map(page, found, first);
     }
-    places(page, found, location);
+    page.details("The force at every place", |inside| places(inside, found, location));
 }
 
 /// A finding's effect and place in words, as a title.
@@ -172,7 +172,7 @@ fn within(main: &Trace) -> String {
     } else {
         format!(
             "at the other samples it differs by {} of the law's rms: the interval contains only sensor noise, not errors of the rest of \
-             the model, and the true law may be none of the known ones",
+             the model. The true law may be none of the known ones",
             percent(size)
         )
     };

@@ -39,8 +39,8 @@ pub fn page(shown: &Shown) -> Page {
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(found.verdict.word), &sentence(&found.verdict.sentence));
-    page.text(&summary(found, adds(best)));
     todo(&mut page, shown.steps);
+    page.text(&summary(found, adds(best)));
     for note in shown.notes {
         page.note(&sentence(note));
     }
@@ -57,14 +57,11 @@ pub fn page(shown: &Shown) -> Page {
     held_out::section(&mut page, found, best);
     page.section("The missing force");
     force::section(&mut page, found, best);
-    page.section("All hypotheses");
-    tables::hypotheses(&mut page, found, best);
-    page.section("Parameters before and after");
-    tables::numbers(&mut page, found, best);
-    page.section("Each record alone");
-    tables::per_record(&mut page, found);
-    page.section("Checks of the recordings");
-    tables::audit(&mut page, found);
+    page.section("Details");
+    page.details("All hypotheses", |inside| tables::hypotheses(inside, found, best));
+    page.details("Parameters before and after", |inside| tables::numbers(inside, found, best));
+    page.details("Each record alone", |inside| tables::per_record(inside, found));
+    page.details("Checks of the recordings", |inside| tables::audit(inside, found));
     ending(&mut page, &TERMS);
     page
 }
@@ -109,7 +106,7 @@ fn summary(found: &Diagnosis, added: bool) -> String {
         }
     }
     if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
-        text.push_str(&format!(" It shows {}.", shows(place)));
+        text.push_str(&format!(" The missing effect appears at: {}.", shows(place)));
     }
     if let Some(errors) = errors(&verdict.error_budget) {
         text.push_str(&format!(" The prediction error is partly {errors}."));
@@ -126,7 +123,7 @@ fn findings(page: &mut Page, verdict: &Verdict) {
     let replacing = all.iter().any(|f| !f.replaces.is_empty());
     let mut headers = vec![if verdict.word.claims() { "missing" } else { "nearest" }, "where", "parameters"];
     headers.extend(replacing.then_some("in place of"));
-    headers.extend(["confidence", "or instead"]);
+    headers.extend(["confidence", "alternatives"]);
     let mut table = Table::new(headers);
     for finding in all {
         let sure = if finding.confidence > 0.8 { Tone::Good } else { Tone::Unsure };

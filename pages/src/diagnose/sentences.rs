@@ -40,6 +40,8 @@ pub fn alternatives(finding: &Finding) -> Vec<String> {
 fn parameter(parameter: &Parameter) -> String {
     let one = |value: f64, ci95: &Interval, unit: &str| {
         let interval = match ci95 {
+            // Three digits do not show a narrow interval.
+            [Some(low), Some(high)] if si(*low, unit) == si(*high, unit) => format!("95 %: ±{}", si(0.5 * (high - low), unit)),
             [Some(low), Some(high)] => format!("95 %: {} to {}", si(*low, unit), si(*high, unit)),
             [Some(low), None] => format!("95 %: above {}", si(*low, unit)),
             [None, Some(high)] => format!("95 %: below {}", si(*high, unit)),

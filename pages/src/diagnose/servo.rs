@@ -32,8 +32,8 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
     let mut page = Page::new(&format!("Diagnosis of the servo joints of {name}"));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     let Some(servo) = &verdict.servo else { return page };
-    page.text(&sentence(&format!("{}.", servo.scale)));
     todo(&mut page, steps);
+    page.text(&sentence(&servo.scale));
     for note in &found.notes {
         page.note(&sentence(note));
     }
@@ -61,7 +61,7 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         .collect();
     match rows.is_empty() {
         true => page.text("Nothing in addition to delay, second order and offset."),
-        false => page.table(table(["where", "what", "numbers", "confidence", "or instead"], rows)),
+        false => page.table(table(["where", "what", "parameters", "confidence", "alternatives"], rows)),
     };
 
     page.section("Free runs from the commands");
@@ -90,21 +90,24 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         drawn(&mut page, &problem.joints[answer.joint].name, answer);
     }
 
-    page.section("What these recordings do not separate");
+    page.section("Details");
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
         .flat_map(|j| j.shared.iter().map(|s| vec![j.joint.clone(), sentence(&s.sentence), sentence(&s.separated_by)]))
         .collect();
-    page.table(table(["joint", "what is shared", "what separates them"], rows));
+    page.details("What these recordings do not separate", |inside| {
+        inside.table(table(["joint", "not separated", "what separates them"], rows));
+    });
 
-    page.section("Numbers");
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
         .flat_map(|j| j.numbers.iter().map(|(key, e)| vec![j.joint.clone(), key.replace('_', " "), estimate(e)]))
         .collect();
-    page.table(table(["joint", "number", "value and 95 % interval"], rows));
+    page.details("Parameters", |inside| {
+        inside.table(table(["joint", "parameter", "value and 95 % interval"], rows));
+    });
     ending(&mut page, &TERMS);
     page
 }

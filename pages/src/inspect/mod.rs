@@ -25,12 +25,12 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     let wrong = report.wrong().count();
     page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
     if !report.findings.is_empty() {
-        page.section("What was found");
         let items: Vec<(String, Option<String>)> =
             report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
         if !items.is_empty() {
             lines_to_paste(&mut page, &items);
         }
+        page.section("Findings");
         let mut table = Table::new(["", "recording", "joint", "finding", "sure", "what to do"]);
         for finding in &report.findings {
             let (word, tone) = if finding.weight == Weight::Wrong { ("wrong", Tone::Bad) } else { ("note", Tone::Neutral) };
@@ -45,6 +45,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         }
         page.table(table);
     }
+    pictures(&mut page, report, recordings);
     if !report.responses.is_empty() {
         page.section("Command and response");
         let mut table = Table::new(std::iter::once("recording").chain(response::HEADERS));
@@ -58,8 +59,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         }
         page.text("A dash: not identifiable from this motion. Droop, dead band and speed limit are in the position's SI unit.");
     }
-    pictures(&mut page, report, recordings);
-    page.section("Signals");
+    page.section("Details");
     page.details("What each column is", |inside| {
         let mut table = Table::new(["recording", "signal", "is", "unit", "sure", "why", "from", "to", "step", "noise"]);
         for signal in &report.signals {
@@ -134,7 +134,7 @@ fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
         }
     }
     if !drawn.is_empty() {
-        page.section("What shows it");
+        page.section("Evidence");
     }
     for (figure, caption) in drawn {
         page.figure(figure, &caption);

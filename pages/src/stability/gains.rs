@@ -77,7 +77,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         (false, _) => format!("Re-simulation at {} gains with the grip as recorded; the colour is the verdict.", swept.len()),
         (true, Some(again)) => format!(
             "The colour is the verdict of the re-simulation with the grip as recorded, at the {} gains of the search for the stability \
-             limit (--sweep adds more); the limit was refined with {} runs.",
+             limit (--sweep adds more). The limit was refined with {} runs.",
             swept.len(),
             again.edge.evaluations
         ),

@@ -77,7 +77,8 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     }
     page.details("How the response was estimated", |inside| {
         inside.text(&frequency.method);
-        let mut table = Table::new(["dither rms", "rows", "window", "segment", "segments", "averages", "line spacing", "critical μλ", "95 % interval"]);
+        let mut table =
+            Table::new(["dither rms", "rows", "window", "segment", "segments", "averages", "line spacing", "critical μλ", "95 % interval"]);
         for level in &frequency.levels {
             let a = &level.averaging;
             table.push([
@@ -104,8 +105,8 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         }
         let r = &frequency.rows;
         inside.text(&format!(
-            "Of {} rows {} were used; left out: {} missing, {} clamped, {} while a gain ramped, {} out of contact, {} while the hand moved, \
-             {} without excitation, {} while settling.",
+            "Of {} rows {} were used. Omitted: {} missing, {} clamped, {} while a gain ramped, {} out of contact, {} while the hand \
+             moved, {} without excitation, {} while settling.",
             r.all, r.used, r.missing, r.clamped, r.ramping, r.free, r.moving, r.quiet, r.settling
         ));
     });
@@ -124,7 +125,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by_key(|i| first == Some(*i)); // the curve that decides last, on top
     for (i, (level, axis)) in order.into_iter().filter_map(|i| Some((i, found.get(i)?))) {
-        let at = |k: usize| told(axis, k).map_or((f64::NAN, f64::NAN), |l| (gain * l[0], gain * l[1]));
+        let at = |k: usize| at_line(axis, k).map_or((f64::NAN, f64::NAN), |l| (gain * l[0], gain * l[1]));
         let (re, im): (Vec<f64>, Vec<f64>) = (0..axis.l.len()).map(at).unzip();
         seen.extend(re.iter().copied().zip(im.iter().copied()));
         let every = axis.l.len().div_ceil(DISCS).max(1);
@@ -141,7 +142,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(colour));
         let curve = Series::line(&name, &re, &im).colour(colour).dash(Dash::Solid);
         plot = plot.series(if leads { curve.by("frequency", "Hz", &level.hz).width(2.2) } else { curve.width(0.8) });
-        let lines: Vec<usize> = (0..axis.l.len()).filter(|k| told(axis, *k).is_some()).collect();
+        let lines: Vec<usize> = (0..axis.l.len()).filter(|k| at_line(axis, *k).is_some()).collect();
         let mut marks = vec![lines.first().copied(), lines.last().copied()];
         if let Some(hz) = axis.edge.frequency_hz {
             let near = |k: &&usize| level.hz.get(**k).map_or(f64::INFINITY, |f| (f - hz).abs());
@@ -195,7 +196,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
     let (mut lowest, mut highest) = (0.0f64, 0.0f64);
     let first = first_edge(found);
     for (i, (level, axis)) in found.iter().enumerate() {
-        let size = |k: usize| told(axis, k).map_or(f64::NAN, |l| gain * l[0].hypot(l[1]));
+        let size = |k: usize| at_line(axis, k).map_or(f64::NAN, |l| gain * l[0].hypot(l[1]));
         let db = |v: f64| 20.0 * v.log10();
         let n = axis.l.len();
         let spread = |k: usize| INTERVAL_95 * gain * axis.sigma.get(k).copied().unwrap_or(f64::NAN);
@@ -230,7 +231,7 @@ fn first_edge(found: &[(&LevelEstimate, &AxisEstimate)]) -> Option<usize> {
 }
 
 /// L at a line that carries information, per unit gain.
-fn told(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
+fn at_line(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
     let told = axis.told.get(line).copied().unwrap_or(false);
     axis.l.get(line).copied().filter(|l| told && l.iter().all(|v| v.is_finite()))
 }
@@ -240,7 +241,7 @@ fn unwrapped(axis: &AxisEstimate) -> Vec<f64> {
     let mut before: Option<f64> = None;
     (0..axis.l.len())
         .map(|k| {
-            let Some(l) = told(axis, k) else { return f64::NAN };
+            let Some(l) = at_line(axis, k) else { return f64::NAN };
             let angle = l[1].atan2(l[0]).to_degrees();
             let angle = before.map_or(angle, |b| angle + 360.0 * ((b - angle) / 360.0).round());
             before = Some(angle);

@@ -31,8 +31,8 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
         false => format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())),
     });
     page.lead(tone(found.verdict), &lead(found));
-    page.text(&capital(&found.reason));
     todo(&mut page, steps);
+    page.text(&capital(&found.reason));
     for d in &found.disagreements {
         page.warning(&capital(&d.text));
     }
@@ -44,28 +44,25 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
         coupled::coupled(&mut page, found);
         page.section("Response, as recorded");
     } else {
+        page.section("Gain");
+        gains(&mut page, found, curve);
+        page.section("Methods");
         page.table(methods(found));
         page.section("Loop, measured");
         measured(&mut page, found);
         axes::axes(&mut page, found);
-        page.section("Gain");
-        gains(&mut page, found, curve);
         page.section(&format!("Response at μλ = {}", number(found.gain.product())));
     }
     response(&mut page, found, session);
-    page.section("Energy");
-    match &found.resimulated {
-        Some(again) => {
-            energy(&mut page, &again.energy, &format!("re-simulated at μλ = {}", number(found.gain.product())));
-            page.details("Energy as recorded", |inside| energy(inside, &found.recorded_energy, "as recorded"));
-        }
-        None => energy(&mut page, &found.recorded_energy, "as recorded"),
+    page.section("Details");
+    if let Some(again) = &found.resimulated {
+        let at = format!("re-simulated at μλ = {}", number(found.gain.product()));
+        page.details(&format!("Energy, {at}"), |inside| energy(inside, &again.energy, &at));
     }
-    page.section("Transparency, as recorded");
-    transparency(&mut page, &found.transparency);
+    page.details("Energy, as recorded", |inside| energy(inside, &found.recorded_energy, "as recorded"));
+    page.details("Transparency, as recorded", |inside| transparency(inside, &found.transparency));
     if !found.checks.is_empty() || found.loop_check.is_some() {
-        page.section("Models against the recording");
-        models(&mut page, found);
+        page.details("Models against the recording", |inside| models(inside, found));
     }
     ending(&mut page, &TERMS);
     page

@@ -33,9 +33,9 @@ pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
 }
 
 /// The error for a table whose first row holds numbers.
-pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers; \
-     write one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ where no column is \
-     the time); a line that begins with # is a comment";
+pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers. \
+     Add one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ if no column is the \
+     time). A line that begins with # is a comment";
 
 /// Whether a table's first row holds numbers, which are no names of columns.
 pub fn is_no_heading<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
