@@ -214,7 +214,7 @@ fn felt(found: &Answer, lines: &mut Lines) {
             parts.push(format!("{:.1} % of it cancelled in the first 50 ms", 100.0 * c.quality));
         }
         if !parts.is_empty() {
-            lines.put("felt", format!("{}: {}", t.name, parts.join("; ")));
+            lines.put("hand", format!("{}: {}", t.name, parts.join("; ")));
         }
     }
 }

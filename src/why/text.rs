@@ -21,7 +21,7 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
     };
     line("happens", &answer.happens);
     if let Some(beneath) = &answer.beneath {
-        line("beneath", &format!("without that limit: {beneath}"));
+        line("otherwise", &format!("without that limit: {beneath}"));
     }
     match answer.edge {
         Some(edge) => line("gain", &format!("mu*lambda = {:.3}; the loop as recorded is stable up to {edge:.3}", answer.gain)),

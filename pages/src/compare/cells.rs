@@ -8,12 +8,12 @@ use backdrive_stability::outcome::Outcome;
 pub const COLUMNS: [(&str, &str); 8] = [
     ("law", "the coupling between master and slave"),
     (
-        "edge",
+        "limit",
         "stability limit: the loop gain μλ above which the loop is not stable; > if it is stable at every gain searched, or a clamp \
         acts first",
     ),
     ("at the gain", "the motion at the gain of the comparison"),
-    ("shown", "stiffness displayed to the hand in contact, relative to μλ times the wall's; 100 % is transparent"),
+    ("stiffness", "stiffness displayed to the hand in contact, relative to μλ times the wall's; 100 % is transparent"),
     ("drag", "resisting force per velocity in free motion, at the master"),
     ("error, free", "slave position minus μ times the master's before contact, rms"),
     ("error, contact", "the same in contact; on a stiff wall most of it is due to the wall"),

@@ -13,7 +13,7 @@ use compared::Compared;
 /// The terms of the page.
 const TERMS: [(&str, &str); 4] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("edge", "the μλ above which the loop is not stable while the hand presses on the wall"),
+    ("limit", "the μλ above which the loop is not stable while the hand presses on the wall"),
     ("link", "delay, jitter and loss of packets between master and slave, the same each way"),
     ("canceller", "the law direct, with the master's response to the reflected force subtracted from the motion"),
 ];
@@ -121,11 +121,11 @@ fn picture(compared: &Compared) -> Option<Figure> {
         })
     };
     let edge: Of = |c| c.critical_gain.or((c.stable_up_to > 0.0).then_some(c.stable_up_to));
-    let first = Plot::new("Edge").x_axis("delay each way", "ms").y_axis("stability limit μλ", "").y_log().height(230.0);
+    let first = Plot::new("Stability limit").x_axis("delay each way", "ms").y_axis("stability limit μλ", "").y_log().height(230.0);
     let share =
         Plot::new("Displayed stiffness").y_axis("of the wall's", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
     let drag = Plot::new("Drag in free motion").y_axis("drag", "N s/m").include_y(0.0).height(180.0);
-    let off = Plot::new("Position error of the slave in free motion").y_axis("off", "m").include_y(0.0).height(180.0);
+    let off = Plot::new("Position error of the slave in free motion").y_axis("error", "m").include_y(0.0).height(180.0);
     Some(Figure::stacked([
         plot(first, edge),
         plot(share, |c| c.measures.stiffness_share.map(|s| 100.0 * s)),

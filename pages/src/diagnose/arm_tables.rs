@@ -21,7 +21,7 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
         return;
     }
     let replacing = all.iter().any(|f| !f.replaces.is_empty());
-    let mut headers = vec!["missing", "where", "numbers"];
+    let mut headers = vec!["missing", "where", "parameters"];
     headers.extend(replacing.then_some("in place of"));
     headers.extend(["confidence", "alternatives"]);
     let simulated = all.iter().any(|f| f.closed_loop.is_some());

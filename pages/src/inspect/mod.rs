@@ -23,7 +23,7 @@ const WINDOW_S: f64 = 8.0;
 pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     let mut page = Page::new("Checks of the recording");
     let wrong = report.wrong().count();
-    page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
+    page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &lead(report));
     if !report.findings.is_empty() {
         let items: Vec<(String, Option<String>)> =
             report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
@@ -116,6 +116,12 @@ fn followed(answer: &Response, recordings: &[Recording]) -> Option<Figure> {
     let (u, y) = (command.even.get(rows.clone())?, position.even.get(rows)?);
     let plot = Plot::new(&response::title(answer)).x_axis("time", "s").y_axis("position", "");
     Some(Figure::from(plot.line("command", &t, u).line("position", &t, y)))
+}
+
+/// The answer, with the first problem and how many more there are.
+fn lead(report: &Report) -> String {
+    let Some(first) = report.wrong().next() else { return format!("{}.", report.sentence()) };
+    format!("{}. First: {}.", report.sentence(), first.message)
 }
 
 fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
