@@ -54,7 +54,7 @@ fn dispatched(command: &Command) -> Result<u8, Failure> {
         | Command::Node(_)
         | Command::SealedMaster(_)
         | Command::Bag(cli::Bag::Play { .. }) => {
-            let message = "this verb starts processes of its own; run it from the command line".to_string();
+            let message = "this verb starts processes; run it from the command line".to_string();
             Err(Failure { code: code::USAGE, message })
         }
         command => dispatch(command),

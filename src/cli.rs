@@ -51,18 +51,19 @@ pub use why::Why;
 
 use clap::{Parser, Subcommand};
 
-/// Run force-reflecting telerobots, record them, and ask whether they are stable.
+/// Find the effects that a model leaves out, from recordings; run force-reflecting telerobots, and analyse their stability.
 ///
-/// Results go to standard output, everything else to standard error.
-/// What is written is named alike in every verb: --bag a bag, --csv a table, --html a page, --out what else a verb makes (a model, a folder);
+/// Results go to standard output, all other messages to standard error.
+/// Output options are the same in all verbs: --bag a bag, --csv a table, --html a page, --out other files (a model, a folder);
 /// --json prints the result for programs.
-/// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input;
-/// 4 data was lost; 5 this machine or its network does not let it (shared memory, disk, permission, a stranger on the run's topics); 6 a node failed;
-/// 7 it cannot be told; 130 interrupted.
+///
+/// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input; 4 data was lost.
+/// 5 prevented by this machine or its network (shared memory, disk, permission, a foreign sender on the run's topics).
+/// 6 a node failed; 7 not known; 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "backdrive", version = env!("BACKDRIVE_VERSION"), propagate_version = true, arg_required_else_help = true)]
 pub struct Cli {
-    /// What to do.
+    /// The verb.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -72,36 +73,36 @@ pub struct Cli {
 pub enum Command {
     /// Run a graph: every node its own process, every topic recorded.
     ///
-    /// Of a graph with a master, a scaling and a slave that can touch something the run says whether its loop was stable. It is judged while the hand
-    /// holds still in contact for at least 0.45 s: a run that never does so, that lost messages or a node, or ended before its duration is not called
-    /// stable (exit 7). Of a graph without such a loop, as of one that identifies a device, nothing is claimed, and a run that went well ends with 0.
+    /// For a graph with a master, a scaling and a slave with an environment, the run reports whether its loop was stable. It is judged while the hand
+    /// holds still in contact for at least 0.45 s. A run without such a rest, with lost messages or a lost node, or that ended early, is not called
+    /// stable (exit 7). For a graph without such a loop, such as an identification, a successful run ends with 0.
     #[command(after_help = run::HELP)]
     Run(Run),
-    /// Run a bag's graph again from its recorded operator, with what you change, and say whether it was stable.
+    /// Re-simulate a bag's graph with the recorded operator and your changes, and report whether the loop is stable.
     #[command(after_help = replay::HELP)]
     Replay(Replay),
-    /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
+    /// Compute from a recording whether the loop is stable at a gain, and how far the stability limit is.
     #[command(after_help = stability::HELP)]
     Stability(Stability),
-    /// Ask a bag why its loop shakes, and what would stop it: causes with their evidence, and remedies that were tried on the loop run again.
+    /// Find the cause of an oscillation in a recording, and remedies: causes with evidence, remedies tested by re-simulation.
     #[command(after_help = why::HELP)]
     Why(Why),
-    /// Run the same hand through each law between master and slave, and through the canceller: edge, transparency, tracking, effort.
+    /// Compare coupling laws and the canceller with the same hand: stability limit, transparency, tracking, effort.
     #[command(after_help = compare::HELP)]
     Compare(Compare),
-    /// Ask whether recordings are right: what each signal is, what is wrong with it, how each joint answers its command. Needs no model.
+    /// Check recordings without a model: what each signal is, what is wrong with it, and how each joint responds to its command.
     #[command(after_help = inspect::HELP)]
     Inspect(Inspect),
-    /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
+    /// Write a first model and a set for your own recordings: asks what is driven and measured, and checks the files.
     #[command(after_help = init::HELP)]
     Init(Init),
-    /// Find where a model and recordings part, and which physics the model leaves out.
+    /// Find which effects a model leaves out, from recordings.
     #[command(after_help = diagnose::HELP)]
     Diagnose(Diagnose),
-    /// Refit a model's numbers to recordings, its structure as it is: standard errors, correlations, agreement between records.
+    /// Refit a model's parameters to recordings without changing its structure: standard errors, correlations, agreement between records.
     #[command(after_help = fit::HELP)]
     Fit(Fit),
-    /// Identify an engine test bench from its bags: inertias, shaft, maps, the dynamometer's linear part, the engine's lag.
+    /// Identify an engine test bench from its bags: inertias, shaft, maps, linear part of the dynamometer, lag of the engine.
     #[command(after_help = test_bench::HELP)]
     TestBench(TestBench),
     /// Check a graph file; errors point at the line.
@@ -110,36 +111,36 @@ pub enum Command {
     /// Draw a graph.
     #[command(after_help = graph::DRAW_HELP)]
     Graph(Graph),
-    /// Run a model on a recording, a set of recordings, or a named excitation.
+    /// Simulate a model with a recording, a set of recordings, or an excitation.
     #[command(after_help = simulate::HELP)]
     Simulate(Simulate),
-    /// Write a model for MuJoCo, as URDF, for Isaac, or as feed-forward of friction, and say what that leaves out.
+    /// Export a model for MuJoCo, URDF, Isaac, or as a friction feed-forward, and report what the format cannot represent.
     #[command(after_help = export::HELP)]
     Export(Export),
-    /// Look at a model file.
+    /// Show or check a model file.
     #[command(subcommand)]
     Model(Model),
-    /// Look at bags and convert them.
+    /// Show, compare, recover and convert bags.
     #[command(subcommand)]
     Bag(Bag),
-    /// Remove what dead runs left in shared memory and on disk; live runs are not touched.
+    /// Remove the remains of dead runs in shared memory and on disk; active runs are not touched.
     #[command(
         after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
     )]
     Clean,
-    /// Put the topics of a local graph on ROS 2; nothing is taken from there, unless other hosts of the graph are asked for with --both-ways.
+    /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),
-    /// Make the secret by which the hosts of a run know each other: copy it to each, and name it with `run --host NAME --secret FILE`.
+    /// Create the secret with which the hosts of a run authenticate: copy it to each, and name it with `run --host NAME --secret FILE`.
     #[command(after_help = secret::HELP)]
     Secret(Secret),
-    /// Say what of this machine would hurt a run: shared memory, real-time rights, timers, multicast, socket buffers.
+    /// Check this machine for runs: shared memory, real-time rights, timers, multicast, socket buffers.
     #[command(after_help = doctor::HELP)]
     Doctor(Doctor),
-    /// Conceal effects in a master, find them from the bags of a session, and show what that is worth on the graph.
+    /// Test the diagnosis: conceal effects in a master, find them from a session's bags, and measure the gain in stability.
     #[command(after_help = prove::HELP)]
     Prove(Prove),
-    /// Print what a shell needs to complete this program's verbs and options.
+    /// Print a shell's completion script for this program.
     #[command(after_help = shell::COMPLETIONS_HELP)]
     Completions(Completions),
     /// Write manual pages: one for this program and one for every verb.

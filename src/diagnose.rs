@@ -73,7 +73,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         to_do(&steps)?;
     }
     if stop.load(Ordering::SeqCst) {
-        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; the results so far are written".to_string() });
     }
     Ok(exit_code(found.verdict.word))
 }
@@ -137,7 +137,7 @@ pub fn diagnose_into(
 fn of_one_axis(without: &[String]) -> Result<Vec<String>, Failure> {
     match without.iter().find(|name| physics_named(name).is_none()) {
         Some(name) => {
-            let message = format!("--without {name}: only arms have it, and this model has no [robot]; leave it out");
+            let message = format!("--without {name}: it is only for arms, and this model has no [robot]; omit it");
             Err(Failure { code: code::USAGE, message })
         }
         None => Ok(without.to_vec()),

@@ -55,8 +55,7 @@ pub fn text(found: &Diagnosis) -> String {
     if found.search.cut {
         line(
             "note",
-            "the search was cut off by the clock (--patience) or interrupted: on another machine it may come to another verdict"
-                .to_string(),
+            "the search was cut off by the clock (--patience) or interrupted: on another machine the verdict may differ".to_string(),
         );
     } else if found.search.exhausted {
         line("note", "the search ended before everything was tried".to_string());
@@ -102,7 +101,7 @@ fn refit(found: &Diagnosis) -> String {
     moved.sort_by(|a, b| b.moved_sd.unwrap_or(0.0).abs().total_cmp(&a.moved_sd.unwrap_or(0.0).abs()));
     let most = moved.first().filter(|r| r.moved_sd.is_some_and(|s| s.abs() > 2.0)).map_or(String::new(), |r| {
         let given = r.given.unwrap_or(f64::NAN);
-        format!("; {} moved most, {} to {} ({:.0} sd)", r.name, number(given), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
+        format!("; {} moved most, {} to {} ({:.0} sd)", r.name, si(given, &r.unit), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
     });
     format!(
         "residual {} times {noise} as given, {} with the parameters refitted{most}; {}",
@@ -125,7 +124,7 @@ fn held_out(held: &HeldOut, noise: &str) -> String {
 }
 
 fn described(finding: &Finding) -> String {
-    let instead = if finding.replaces.is_empty() { String::new() } else { format!(", in place of {}", finding.replaces.join(" and ")) };
+    let instead = if finding.replaces.is_empty() { String::new() } else { format!(", instead of {}", finding.replaces.join(" and ")) };
     let named = words::named(&finding.physics, &finding.place);
     format!("{named}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding))
 }
@@ -134,7 +133,7 @@ fn described(finding: &Finding) -> String {
 fn remains(left: &Remaining) -> Option<String> {
     let place = shows(left.shows.as_ref()?);
     let share = left.share.map_or(String::new(), |s| {
-        let floor = left.floor_share.map_or(String::new(), |f| format!(" (the sensors' noise would be {})", words::share(f)));
+        let floor = left.floor_share.map_or(String::new(), |f| format!(" (sensor noise: {})", words::share(f)));
         format!("{} of the residual with the parameters refitted{floor}; ", words::share(s))
     });
     let like = left.looks_like.as_ref().map_or(String::new(), |like| format!("; looks most like {like}"));

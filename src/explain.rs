@@ -22,9 +22,9 @@ fn steps(search: &Search) -> String {
             Outcome::Taken { proposed, fitted, work } => {
                 writeln!(out, "{:<40} {proposed:>8} {fitted:>6} {:>10.1} {:>9.3}  {best}", entry.step, work as f64 / 1e6, entry.residual)
             }
-            Outcome::ResidualIsWhite => writeln!(out, "{:<40} not taken: the residual is white", entry.step),
-            Outcome::NoWorkLeft => writeln!(out, "{:<40} not taken: the effort is used up (--effort)", entry.step),
-            Outcome::NothingNew => writeln!(out, "{:<40} not taken: nothing new to try", entry.step),
+            Outcome::ResidualIsWhite => writeln!(out, "{:<40} skipped: the residual is white", entry.step),
+            Outcome::NoWorkLeft => writeln!(out, "{:<40} skipped: the effort is used up (--effort)", entry.step),
+            Outcome::NothingNew => writeln!(out, "{:<40} skipped: nothing new to try", entry.step),
         };
     }
     let _ = writeln!(
@@ -44,18 +44,18 @@ fn structures(search: &Search) -> String {
     let _ = writeln!(
         out,
         "{:<58} {:>10} {:>9} {:>9} {:>11} {:>11}  why",
-        "structure", "parameters", "residual", "unseen", "by fits", "by unseen"
+        "structure", "parameters", "residual", "unseen", "by fits", "by held out"
     );
     for Beaten { name, parameters, residual, unseen, by_fits, by_unseen, why } in all.iter().take(SHOWN) {
         let unseen = unseen.map_or("-".to_string(), |u| format!("{u:.3}"));
         let _ = writeln!(out, "{name:<58} {parameters:>10} {residual:>9.3} {unseen:>9} {by_fits:>11.1} {by_unseen:>11.1}  {}", why.text());
     }
     if all.len() > SHOWN {
-        let _ = writeln!(out, "and {} more that are further behind", all.len() - SHOWN);
+        let _ = writeln!(out, "and {} more that are worse", all.len() - SHOWN);
     }
     let _ = write!(
         out,
-        "by fits, by unseen: how far the claimed structure is ahead (difference of the information criterion, effective samples)"
+        "by fits, by held out: advantage of the claimed structure (difference of the information criterion, effective samples)"
     );
     out
 }

@@ -23,7 +23,7 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
     let exported = written(&model, &how).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
     let errors = match options.on.is_empty() {
         true => None,
-        false => Some(busy("simulating the recordings without what is left out", || {
+        false => Some(busy("simulating the recordings without the omitted parts", || {
             errors(&options.on, &options.model, &options.ignore_signal, &exported.left_out)
         })?),
     };
@@ -82,7 +82,7 @@ fn list(options: &cli::Export, left_out: &[LeftOut], errors: Option<&Errors>) ->
         None if !left_out.iter().any(LeftOut::matters) => {}
         None => {
             text += &format!(
-                "the error that this makes on recordings: backdrive export {} --to {} --on SET\n",
+                "effect on the error on recordings: backdrive export {} --to {} --on SET\n",
                 options.model.display(),
                 options.to.word()
             )

@@ -31,7 +31,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     if model.arm.is_some() {
         let model = options.model.display();
         return Err(Failure::input(format!(
-            "{model}: [robot]: fit takes models of one axis; the numbers of an arm are refitted by `backdrive diagnose`"
+            "{model}: [robot]: fit is for models of one axis; the parameters of an arm are refitted by `backdrive diagnose`"
         )));
     }
     let stop = interrupt::heard()?;
@@ -95,14 +95,12 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
             let stem = options.model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned());
             let again = Builder::again().without("--json", false).option_writes("--out", Path::new(&format!("{stem}.fitted.toml")));
             steps.push(Step::new(
-                "Write the model with these numbers: the same command with a file.",
+                "Write the model with these parameters: the same command with a file.",
                 [again.build().filter(|c| c.is("fit"))],
             ));
         }
-        Some(out) if agree => steps.push(Step::new(
-            "Look at what the refitted model predicts of a recording.",
-            [simulated(out, files, Path::new("fitted-predicted.csv"))],
-        )),
+        Some(out) if agree => steps
+            .push(Step::new("Compare the refitted model with a recording.", [simulated(out, files, Path::new("fitted-predicted.csv"))])),
         Some(_) => {}
     }
     let asked = Builder::verb("diagnose");
@@ -114,8 +112,8 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
     };
     let asked = options.ignore_signal.iter().fold(asked, |asked, signal| asked.word("--ignore-signal").word(signal));
     let text = match agree {
-        true => "Find out whether the device has physics that its model leaves out.",
-        false => "The records disagree, so that no numbers make this structure the device: find out which physics its model leaves out.",
+        true => "Find out whether the model leaves out an effect.",
+        false => "The records disagree, so no parameters fit them all with this structure: find out which effect the model leaves out.",
     };
     let asked = asked.option_writes("--out", Path::new("diagnosis")).build();
     steps.insert(if agree { steps.len() } else { 0 }, Step::new(text, [asked]));
@@ -136,11 +134,8 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
     }
     let mut out = columns(&table);
     for pair in &fitted.pairs {
-        let _ = writeln!(
-            out,
-            "correlated: {} with {} ({:.3}): the recordings tell them apart badly",
-            pair.first, pair.second, pair.correlation
-        );
+        let _ =
+            writeln!(out, "correlated: {} with {} ({:.3}): the recordings hardly separate them", pair.first, pair.second, pair.correlation);
     }
     let _ = writeln!(out);
     let mut table = vec![["record", "output", "nrmse as given", "fitted", "in noise sd", ""].map(String::from).to_vec()];

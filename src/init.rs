@@ -35,13 +35,13 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let made = prepared.keep()?;
     output::file(&model, prepared.model(&name))?;
     output::file(&set, prepared.set(MODEL))?;
-    let partial = prepared.partial().iter().map(|name| format!("{name}: is not in all of the recordings, so that it was not offered"));
+    let partial = prepared.partial().iter().map(|name| format!("{name}: is not in all recordings, so it was not offered"));
     let (partial, unread): (Vec<String>, _) = (partial.collect(), prepared.unread().to_vec());
     let Prepared { plan, seen, records, assumed, .. } = prepared;
 
     let wrote = format!("{} and {}", model.display(), set.display());
     let opened = open(std::slice::from_ref(&options.folder), None, None, &[])
-        .map_err(|e| Failure::input(format!("wrote {wrote}, and diagnose would refuse them: {e}")))?;
+        .map_err(|e| Failure::input(format!("wrote {wrote}, but diagnose would refuse them: {e}")))?;
     let remarks = audit::audit(&opened.problem);
     let next = Builder::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();
     if options.json {
@@ -58,7 +58,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let told: Vec<String> =
         seen.doubt.clone().into_iter().chain(assumed).chain(cautions).chain(opened.notes).chain(partial).chain(unread).collect();
     if told.is_empty() {
-        output::line("check     fine: diagnose takes them, and nothing in the recordings speaks against it")?;
+        output::line("check     passed: diagnose accepts the files, and the recordings show no problem")?;
     }
     for (index, text) in told.iter().enumerate() {
         output::line(format_args!("{:<9} {text}", if index == 0 { "check" } else { "" }))?;
@@ -66,7 +66,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     if !made.is_empty() {
         output::line(format_args!("made      {}: bags of the tables", made.join(", ")))?;
     }
-    output::line(format_args!("wrote     {wrote}: look at them"))?;
+    output::line(format_args!("wrote     {wrote}: check them"))?;
     next.iter().try_for_each(|next| output::line(format_args!("next      {next}")))?;
     if is_terminal {
         // What an option cannot say is what happens without it.

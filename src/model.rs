@@ -62,11 +62,11 @@ fn fit_to_show(loaded: &ModelFile, file: &cli::ModelFile) -> Result<(), Failure>
     let path = file.model.display();
     match network.bodies.len() {
         0 if matches!(loaded, ModelFile::Device(_)) => Err(Failure::input(format!(
-            "{path}: is the model of nothing: it has no [bodies]; name what moves, such as `handle = 0.1`, kg (docs/own-recording.md, plant/models)"
+            "{path}: has no [bodies], so nothing moves; add what moves, such as `handle = 0.1`, kg (docs/own-recording.md, plant/models)"
         ))),
         bodies if bodies > MOST_BODIES => Err(Failure::input(format!(
-            "{path}: has {bodies} bodies, and at most {MOST_BODIES} can be looked at; join those that move together (a chain needs few bodies per wave length \
-             of the highest frequency that matters)"
+            "{path}: has {bodies} bodies, and at most {MOST_BODIES} can be shown; merge those that move together (a chain needs few \
+             bodies per wave length of the highest frequency that matters)"
         ))),
         _ => Ok(()),
     }

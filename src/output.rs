@@ -80,7 +80,7 @@ pub fn fail(failure: &Failure) -> ExitCode {
 /// How a verb ends that gives a code. Where JSON was asked for there is some, whatever the code.
 pub fn ended(code: u8) -> ExitCode {
     if code != 0 {
-        tell_program(&Failure { code, message: "ended without a result; standard error says why".to_string() });
+        tell_program(&Failure { code, message: "ended without a result; see standard error".to_string() });
     }
     ExitCode::from(code)
 }
@@ -149,7 +149,7 @@ pub fn page(path: &Path, mut page: Page) -> Result<(), Failure> {
 /// The error of `write`, with the path that was asked for, and exit code 5 where that is about the file.
 pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) -> Result<T, Failure> {
     let failed = |e: io::Error| Failure::write(path, e);
-    let name = path.file_name().ok_or_else(|| Failure::machine(format!("{}: is no name of a file", path.display())))?;
+    let name = path.file_name().ok_or_else(|| Failure::machine(format!("{}: is not a file name", path.display())))?;
     let stream = is_stream(path);
     // A link stays a link: what it points at is replaced.
     let place = if path.is_file() { path.canonicalize().map_err(failed)? } else { path.to_path_buf() };

@@ -15,7 +15,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     let terminal = Terminal::default();
     let replay = Replay::read(path, &options.changes.overrides(None), &terminal)?;
     if replay.is_cut {
-        output::note(format_args!("warning: {}: {}", path.display(), with_recover("was not closed; what it holds is replayed", path)));
+        output::note(format_args!("warning: {}: {}", path.display(), with_recover("was not closed; its content is replayed", path)));
     }
     if let Some(html) = &options.result.html {
         output::writable(html)?;

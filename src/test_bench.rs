@@ -116,7 +116,7 @@ fn text(asked: &Asked, found: &Identified, validation: Option<&Validation>) -> S
     out += "\n";
     out += &columns(&table);
     if let Some(validation) = validation {
-        let mut table = vec![["correlation on recordings that no fit has seen", "%"].map(String::from).to_vec()];
+        let mut table = vec![["correlation on held-out recordings", "%"].map(String::from).to_vec()];
         table.extend(correlations(validation).into_iter().map(|(name, value)| vec![name.to_string(), format!("{:.1}", 100.0 * value)]));
         out += "\n";
         out += &columns(&table);

@@ -19,7 +19,7 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
     set(&place.path(""), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
     let done = place.backdrive(&["diagnose", ".", "--out", "out", "--effort", "2", "--without", "maxwell_slip", "--explain"]);
     assert_eq!(done.code, Some(1), "{done:?}");
-    for note in ["note: --effort does nothing for an arm", "note: --without maxwell_slip does nothing for an arm"] {
+    for note in ["note: --effort has no effect for an arm", "note: --without maxwell_slip has no effect for an arm"] {
         assert!(done.stderr.contains(note), "{done:?}");
     }
     for said in ["MISSING", "dry friction at the elbow", "worth", "out: verdict.json, model.diagnosed.toml, next-motion.csv, report.html"] {
@@ -37,12 +37,12 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
     for said in [
         sentence,
         "What remains of each joint&#39;s torque",
-        "Torque on a log that no fit has seen",
+        "Torque on a held-out log",
         "Friction of each joint",
         "closed loop, diagnosed",
         "base parameter",
-        "What to record next",
-        "--effort does nothing for an arm",
+        "Next recording",
+        "--effort has no effect for an arm",
         "c.csv",
     ] {
         assert!(page.contains(said), "the page does not say \"{said}\"");
@@ -88,7 +88,7 @@ fn what_nothing_explains_is_not_called_fine() {
     assert_eq!(done.code, Some(1), "{done:?}");
     let found = verdict(&place, "out");
     assert_eq!(found["verdict"], "unexplained", "{found:#}");
-    assert!(done.stdout.contains("UNEXPLAINED") && done.stdout.contains("no physics tried explains: at elbow "), "{done:?}");
+    assert!(done.stdout.contains("UNEXPLAINED") && done.stdout.contains("none of the tested effects explains: at elbow "), "{done:?}");
     let joints = &found["arm"]["joints"];
     assert!(joints[0].get("shows").is_none(), "{joints}");
     let [low, high] = [0, 1].map(|i| joints[1]["shows"]["band_hz"][i].as_f64().unwrap());
@@ -160,6 +160,6 @@ fn interrupted_it_writes_what_it_has_and_ends_with_130() {
     system::kill(run.pid(), nix::sys::signal::Signal::SIGINT);
     let done = run.end();
     assert_eq!(done.code, Some(130), "{done:?}");
-    assert!(done.stderr.contains("stopped; what was found until then is written"), "{done:?}");
+    assert!(done.stderr.contains("stopped; the results so far are written"), "{done:?}");
     assert_eq!(verdict(&place, "out")["searched"]["cut_short"], true);
 }

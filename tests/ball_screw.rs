@@ -96,7 +96,7 @@ fn a_slave_that_is_driven_by_a_force_is_told_what_it_needs() {
     };
     says("undriven.toml", &replace(drive, ""), &["undriven.toml:", "node \"slave\"", "driven by a force", "controller"]);
     let both = "[[connections]]\nfrom = \"scaling.command\"\nto = \"slave.command\"\n\n[[connections]]\nfrom = \"controller.force\"\nto = \"slave.force\"\n";
-    says("both.toml", &replace(drive, both), &["hears no command"]);
+    says("both.toml", &replace(drive, both), &["takes no command"]);
     says("law.toml", &replace("law = \"backstepping\"", "law = \"backsteping\""), &["law.toml:", "did you mean \"backstepping\""]);
     let ignorant = |text: String| text.lines().filter(|l| !l.contains("what it knows")).map(|l| format!("{l}\n")).collect();
     says("ignorant.toml", &ignorant, &["ignorant.toml:", "needs model"]);

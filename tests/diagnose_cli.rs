@@ -117,10 +117,10 @@ fn friction_that_was_left_out_is_named_and_written() {
     assert!(done.stdout.lines().count() < 20, "{}", done.stdout);
     let report = read(&place, "out/report.html");
     for said in [
-        "Where the models part most",
+        "Where the models differ most",
         "Dry friction at the motor: force against velocity",
         "What to do now",
-        "Every hypothesis",
+        "All hypotheses",
         "sensor&#39;s noise",
         "held out",
     ] {
@@ -231,7 +231,7 @@ fn interrupted_it_writes_what_it_has() {
     let done = run.end();
     // Either it was still at work, or it had found everything already.
     assert!(done.code == Some(130) || done.code == Some(1), "{done:?}");
-    assert!(done.code == Some(1) || done.stderr.contains("what was found until then is written"), "{done:?}");
+    assert!(done.code == Some(1) || done.stderr.contains("the results so far are written"), "{done:?}");
     let verdict: serde_json::Value = serde_json::from_str(&read(&place, "out/verdict.json")).unwrap();
     assert!(verdict["verdict"].is_string(), "{verdict:#}");
     Model::from_toml(&read(&place, "out/model.diagnosed.toml"), "diagnosed").unwrap();
@@ -335,7 +335,7 @@ fn what_a_fit_has_seen_is_not_held_out_too() {
     for arguments in cases {
         let done = place.backdrive(arguments);
         assert_eq!(done.code, Some(3), "{arguments:?}: {done:?}");
-        assert!(done.stderr.contains("held out") && !done.stderr.contains("no fit sees it"), "{arguments:?}: {done:?}");
+        assert!(done.stderr.contains("held out") && !done.stderr.contains("no fit uses it"), "{arguments:?}: {done:?}");
         assert!(!place.path("out").exists(), "{arguments:?}");
     }
 }
@@ -351,7 +351,7 @@ fn a_hand_that_was_recorded_and_that_nothing_takes_stops_a_diagnosis() {
     }
     let done = place.backdrive(&["diagnose", ".", "--out", "out"]);
     assert_eq!(done.code, Some(3), "{done:?}");
-    for said in ["normal.hand", "nothing takes it", "--grip normal.toml", "--ignore-signal normal.hand", "set.toml"] {
+    for said in ["normal.hand", "has no input for it", "--grip normal.toml", "--ignore-signal normal.hand", "set.toml"] {
         assert!(done.stderr.contains(said), "\"{said}\" is missing: {}", done.stderr);
     }
     assert_eq!(place.backdrive(&["fit", "model.toml", "."]).code, Some(3));

@@ -117,5 +117,5 @@ fn files_of_a_bench_that_are_wrong_are_told_with_their_line() {
     let told = wrong(&text.replace("back_off = 1.2", "back_off = 1.0"));
     assert!(told.contains("back_off") && told.contains("infinite"), "{told}");
     let told = wrong(&text.replace("noise = [0.02, 0.02]", "noise = [0.02]"));
-    assert!(told.contains("1 numbers of noise for 2"), "{told}");
+    assert!(told.contains("1 noise levels for 2"), "{told}");
 }

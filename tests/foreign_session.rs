@@ -134,7 +134,7 @@ fn what_a_bag_lacks_is_said() {
         );
     }
     let session = without("/scaling/gains").unwrap();
-    assert!(session.gain(5000) == 0.3 && session.notes.iter().any(|n| n.contains("graph's plan")), "{:?}", session.notes);
+    assert!(session.gain(5000) == 0.3 && session.notes.iter().any(|n| n.contains("planned in the graph")), "{:?}", session.notes);
 
     // Two hundred lost samples, and a hundred with a clamp.
     let path = dir.path().join("holes.mcap");
@@ -445,7 +445,7 @@ fn the_same_run_in_other_peoples_dress_gives_the_same_session() {
             found.notes
         );
         assert!(found.notes.iter().any(|n| n.contains("lambda") && n.contains("0.20 ms late")), "{:?}", found.notes);
-        assert!(!found.notes.iter().any(|n| n.contains("turned round") || n.contains("goes against")), "{:?}", found.notes);
+        assert!(!found.notes.iter().any(|n| n.contains("is the sign") || n.contains("opposite")), "{:?}", found.notes);
 
         let given = Roles::from_toml(&format!("{ROLES}[gains]\nmu = 1.0\nlambda = 0.3\n"), "roles.toml").unwrap();
         let found = Session::from_roles(&path, &given).unwrap();
@@ -527,8 +527,8 @@ fn turned_signs_are_told() {
     let path = dir.path().join("turned.mcap");
     write(&path, &truth, 0..12_000, Dress { sensor_sign: -1.0, ..EVEN }, mcap::WriteOptions::new());
     let found = Session::from_roles(&path, &Roles::from_toml(ROLES, "roles.toml").unwrap()).unwrap();
-    assert!(found.notes.iter().any(|n| n.contains("should push back")), "{:?}", found.notes);
-    assert!(found.notes.iter().any(|n| n.contains("F_f goes against")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|n| n.contains("as if the contact pulled")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|n| n.contains("F_f has the opposite sign")), "{:?}", found.notes);
 }
 
 #[test]

@@ -265,7 +265,7 @@ fn who_is_missing_is_said_with_the_reason() {
         let (_, code, told) = end(run, Duration::from_secs(30));
         assert_eq!(code, Some(130), "{told}");
         let other = HOSTS[1 - host];
-        assert!(told.contains(&format!("host {other}: not heard in ROS domain {}", ["3", "4"][host])), "{told}");
+        assert!(told.contains(&format!("host {other}: does not respond in ROS domain {}", ["3", "4"][host])), "{told}");
         let hint = format!("{} announces itself in ROS domain {}", ADDRESSES[1 - host], ["4", "3"][host]);
         assert!(told.contains(&hint), "{told}");
     }
@@ -397,7 +397,7 @@ fn a_stopped_slave_does_no_harm_and_a_second_master_ends_the_run_on_both_hosts()
             assert!(has("force_stale") && has("force_back"), "{}: {all:?}\n{told}", HOSTS[host]);
             assert_eq!(code, Some(5), "{}: {report} {told}", HOSTS[host]);
             assert!(report["refused"].as_u64().unwrap() > 0, "{}: {report}", HOSTS[host]);
-            assert!(told.contains("/slave/servo_jp: a stranger speaks here (GID "), "{}: {told}", HOSTS[host]);
+            assert!(told.contains("/slave/servo_jp: a program outside the run sends on this topic (GID "), "{}: {told}", HOSTS[host]);
         }
         // The slave's node reports it in its own host's bag.
         let bag = bag(folder.path(), 1);

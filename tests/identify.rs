@@ -334,5 +334,5 @@ fn experiments_of_different_devices_make_no_common_set() {
     );
     let graph = one(temp.path(), &text);
     let told = fails(&["run", &graph, "--transport", "inproc"], temp.path());
-    assert!(told.contains("experiment \"b\"") && told.contains("a step of its own"), "{told}");
+    assert!(told.contains("experiment \"b\"") && told.contains("a separate step"), "{told}");
 }

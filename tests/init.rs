@@ -170,15 +170,15 @@ fn what_is_missing_or_cannot_be_is_told_with_its_option_and_nothing_is_written()
         [&OF_A_MOTOR[..at], to, &OF_A_MOTOR[at + 2..], &["--yes"]].concat()
     };
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
-        (vec![], 2, "say --motion: "),
-        (vec!["--yes"], 2, "say --drive: "),
-        (with("--constant", &[]), 2, "say --constant: "),
-        (with("--per-count", &[]), 2, "say --per-count: "),
+        (vec![], 2, "give --motion: "),
+        (vec!["--yes"], 2, "give --drive: "),
+        (with("--constant", &[]), 2, "give --constant: "),
+        (with("--per-count", &[]), 2, "give --per-count: "),
         (with("--drive", &["--drive", "j"]), 2, "--drive \"j\": unknown column \"j\""),
         (with("--drive", &["--drive", "enc"]), 2, "a current (A) is needed"),
         (with("--position", &["--position", "none"]), 2, "nothing is measured"),
         (with("--position", &["--position", "enc", "--force", "i"]), 2, "--attached load"),
-        (with("--position", &["--position", "enc", "--held-out", "other.csv"]), 2, "is none of the recordings"),
+        (with("--position", &["--position", "enc", "--held-out", "other.csv"]), 2, "is not one of the recordings"),
         (with("--constant", &["--constant", "0"]), 2, "above 0"),
     ];
     let none = |place: &Place| !place.path("mine/model.toml").exists() && !place.path("mine/set.toml").exists();
@@ -215,9 +215,9 @@ fn what_diagnose_would_refuse_and_an_inertia_that_cannot_be_are_told() {
     let all = [&OF_A_MOTOR[..], &["--yes"]].concat();
     // In g cm^2, as data sheets have it.
     let done = init(&place, &[&all[..], &["--inertia", "1200"]].concat());
-    assert!(done.code == Some(0) && done.stdout.contains("times what the recordings show"), "{done:?}");
+    assert!(done.code == Some(0) && done.stdout.contains("times the estimate from the recordings"), "{done:?}");
     let done = init(&place, &[&all[..], &["--inertia", "1.1e-4", "--overwrite"]].concat());
-    assert!(done.code == Some(0) && !done.stdout.contains("times what the recordings show"), "{done:?}");
+    assert!(done.code == Some(0) && !done.stdout.contains("times the estimate from the recordings"), "{done:?}");
     // Recordings of two rates do not belong together.
     let slow: Vec<String> = std::fs::read_to_string(place.path("mine/weak.csv"))
         .unwrap()

@@ -102,7 +102,7 @@ fn errors_and_missing_values_name_file_column_and_row() {
     assert!(absent.code == Some(3) && absent.stderr.contains("absent.csv: there is no such file"), "{absent:?}");
     place.write("words.csv", "a,b\nx,y\nz,w\n");
     let words = place.backdrive(&["inspect", "words.csv"]);
-    assert!(words.code == Some(3) && words.stderr.contains("words.csv: holds no two rows of numbers"), "{words:?}");
+    assert!(words.code == Some(3) && words.stderr.contains("words.csv: contains fewer than two rows of numbers"), "{words:?}");
     let text = joint(|_, y| y)
         .lines()
         .enumerate()

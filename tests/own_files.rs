@@ -93,10 +93,10 @@ fn without_units_degrees_are_no_radians_and_milliseconds_no_seconds() {
     let place = Place::new();
     let of = ["--drive", "tau", "--position", "q"];
     recorded(&place, "t,tau,q", 1.0, 180.0 / std::f64::consts::PI);
-    is_refused(&init(&place, &of), 2, &["nothing states the unit of q", "--position-unit deg", "q [deg]"]);
+    is_refused(&init(&place, &of), 2, &["the unit of q is not stated", "--position-unit deg", "q [deg]"]);
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "deg"]].concat()));
     recorded(&place, "t,tau,q", 1000.0, 1.0);
-    is_refused(&init(&place, &of), 2, &["nothing states the unit of t", "2.00 s apart", "--time-unit ms"]);
+    is_refused(&init(&place, &of), 2, &["the unit of t is not stated", "2.00 s apart", "--time-unit ms"]);
     // An assumption is reported, and nothing is called fine.
     recorded(&place, "t,tau,q", 1.0, 1.0);
     let done = init(&place, &of);
@@ -297,7 +297,7 @@ fn protobuf_without_its_descriptors_is_refused_in_one_line_by_all() {
     std::fs::create_dir_all(place.path("mine")).unwrap();
     foreign(&place, "mine/pb.mcap", "protobuf", "protobuf", |_| vec![9, 0, 0, 0, 0, 0, 0, 240, 63]);
     let says =
-        ["topic /joint_states is not read: its messages are protobuf", "its schema is no FileDescriptorSet", "write its numbers as CSV"];
+        ["topic /joint_states is not read: its messages are protobuf", "its schema is not a FileDescriptorSet", "Write its values as CSV"];
     let told = place.backdrive(&["bag", "info", "mine/pb.mcap"]);
     assert!(told.stdout.contains("NOT READ") && says.iter().all(|words| told.stdout.contains(words)), "{told:?}");
     assert!(place.backdrive(&["bag", "info", "mine/pb.mcap", "--json"]).json()["topics"][0]["unread"].as_str().unwrap().contains(says[0]));

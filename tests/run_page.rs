@@ -33,7 +33,7 @@ fn a_run_in_one_process_and_its_replay_have_a_page() {
     assert!(page.contains("μλ = 8") && !page.contains("Stable at"), "the replay's page says otherwise");
     let short =
         place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--html", "short.html", "--bag", "short.mcap"]);
-    assert!(short.code == Some(7) && read(&place, "short.html").contains("It cannot be told whether the loop is stable"), "{short:?}");
+    assert!(short.code == Some(7) && read(&place, "short.html").contains("It is not known whether the loop is stable"), "{short:?}");
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn a_run_in_which_a_node_died_says_so_on_its_page() {
     kill(place.process("slave").unwrap(), Signal::SIGKILL);
     assert_eq!(run.end().code, Some(6));
     let page = read(&place, "run.html");
-    for says in ["It cannot be told", "slave", "SIGKILL", "missed deadlines", "loop p99", "Loop time of each node", "force"] {
+    for says in ["It is not known", "slave", "SIGKILL", "missed deadlines", "loop p99", "Loop time of each node", "force"] {
         assert!(page.contains(says), "{says}");
     }
 }

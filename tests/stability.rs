@@ -108,7 +108,7 @@ fn the_edge_is_the_loop_s_and_not_the_question_s() {
     for gain in ["1e-300", "1e300"] {
         let begun = std::time::Instant::now();
         let done = place.backdrive(&["stability", "run.mcap", "--gain", gain]);
-        assert!(done.code == Some(3) && done.stderr.contains("beyond any sense"), "{done:?}");
+        assert!(done.code == Some(3) && done.stderr.contains("out of range"), "{done:?}");
         assert!(begun.elapsed().as_secs() < 30, "{:?}", begun.elapsed());
     }
 }
@@ -166,7 +166,7 @@ fn a_bag_without_excitation() {
     });
     let (code, strange) = ask(&place, "strange.mcap", &["--gain", "0.3"]);
     assert_eq!((code, strange["verdict"].as_str()), (Some(7), Some("cannot_tell")), "{strange}");
-    assert!(texts(&strange, "disagreement").contains("the master's model misses"), "{strange}");
+    assert!(texts(&strange, "disagreement").contains("the master's model does not explain"), "{strange}");
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn a_force_that_is_clipped() {
     assert!((headline / again - 1.0).abs() < 0.01, "{found}");
     assert!(found["critical_gain"].is_null() && found["margins"]["phase_deg"].is_null(), "{found}");
     let text = place.backdrive(&["stability", "run.mcap", "--gain", "0.3", "--grips", "1"]).stdout;
-    assert!(text.contains("on a clamp acts or the travel is left") && text.contains("dB to where a clamp acts"), "{text}");
+    assert!(text.contains("on a clamp acts or the master leaves its travel") && text.contains("dB to where a clamp acts"), "{text}");
 }
 
 #[test]

@@ -55,7 +55,7 @@ impl std::fmt::Display for Fault {
             Fault::Lost { topic, messages, of } => write!(f, "{topic}: {messages} of {of} messages are missing"),
             Fault::Short { steps, of } => write!(f, "it ends after {steps} of the {of} steps of its graph: {} are missing", of - steps),
             Fault::EndUnknown => {
-                write!(f, "what is missing at its end is not known: its recorder left no record of its own, and its graph has no duration")
+                write!(f, "what is missing at its end is not known: its recorder wrote no summary, and its graph has no duration")
             }
             Fault::NotClosed => write!(f, "its writer did not close it: what is missing at its end is not known"),
             Fault::Damaged { what } => write!(f, "damaged: {what}"),
@@ -307,7 +307,7 @@ impl Hearing {
         for (topic, heard) in reader.topics().iter().zip(&self.topics) {
             let name = &topic.name;
             if let Some(step) = heard.twice_but_different {
-                contradiction(format!("{name} holds two different messages of one number, at step {step}"));
+                contradiction(format!("{name} contains two different messages with one sequence number, at step {step}"));
             }
             if let Some(axes) = heard.axes {
                 contradiction(format!("{name} has {} axes by its header, and messages with {axes}", topic.axes.len()));
@@ -372,7 +372,7 @@ impl Hearing {
             Some(of) if of > steps && record.is_none_or(|record| record.recovered) => faults.push(Fault::Short { steps, of }),
             // In real time the last node may be some steps further when the run ends.
             Some(of) if steps > of + of / 20 + 10 => {
-                notes.push(format!("its graph asks for {of} steps, and it holds {steps}; what it holds counts"));
+                notes.push(format!("its graph has {of} steps, and the bag contains {steps}; these are used"));
             }
             None if record.is_none_or(|record| record.recovered) && reader.ended_cleanly() => faults.push(Fault::EndUnknown),
             _ => {}

@@ -124,7 +124,7 @@ impl Schema {
             let field = &fields[place];
             match (field.count, index) {
                 (Count::One, Some(_)) => return Err(format!("{name:?} is not a list")),
-                (Count::Array(_) | Count::Sequence, None) => return Err(format!("{name:?} is a list: say which, as in {name}[0]")),
+                (Count::Array(_) | Count::Sequence, None) => return Err(format!("{name:?} is a list: name the element, as in {name}[0]")),
                 (Count::Array(len), Some(Entry::At(index))) if index >= len => return Err(format!("{name:?} has {len} entries")),
                 (_, entry) => steps.push((place, entry)),
             }

@@ -66,7 +66,7 @@ pub(crate) fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
 /// Why a device or a pipe takes no bag: its own error where it takes nothing at all, such as `/dev/full`.
 fn no_file(path: &Path, mut file: File, kind: std::fs::FileType) -> BagError {
     let refused = if kind.is_char_device() { file.write_all(&[0]).err() } else { None };
-    let why = "it is a device or a pipe, and what is written there cannot be read again; name a file";
+    let why = "it is a device or a pipe, from which a bag cannot be read back; name a file";
     failed(path)(refused.unwrap_or_else(|| std::io::Error::new(ErrorKind::InvalidInput, why)))
 }
 

@@ -48,7 +48,7 @@ impl std::fmt::Display for ClockFault {
         let [least, most] = self.range;
         match self.kind {
             ClockFaultKind::StandsStill => {
-                write!(f, "the clock stands still {times}, {place}, at {at:?} s: leave out what was recorded twice")
+                write!(f, "the clock stops {times}, {place}, at {at:?} s: remove the duplicate samples")
             }
             ClockFaultKind::GoesBack => {
                 write!(f, "the clock goes back {times}, by up to {:.6} s, {place}, at {at:?} s: cut the recording there", -least)

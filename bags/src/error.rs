@@ -45,7 +45,7 @@ pub enum BagError {
         path: PathBuf,
     },
     /// Bytes inside it are wrong.
-    #[error("{}, byte {offset}: {what}; `{}` saves what is whole", path.display(), recover_command(path))]
+    #[error("{}, byte {offset}: {what}; `{}` recovers the intact part", path.display(), recover_command(path))]
     Damaged {
         /// The file.
         path: PathBuf,

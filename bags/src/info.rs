@@ -244,7 +244,7 @@ impl fmt::Display for BagInfo {
         }
         if !self.ended_cleanly {
             writeln!(f, "  the file was not closed; `{}` makes a clean copy", recover_command(Path::new(&self.path)))?;
-            writeln!(f, "  it has no end that tells, so all of it was read")?;
+            writeln!(f, "  it has no summary at its end, so all of it was read")?;
         }
         if let Some(damage) = &self.damage {
             writeln!(f, "  DAMAGED: {damage}")?;
@@ -253,7 +253,7 @@ impl fmt::Display for BagInfo {
             writeln!(f, "  every message was read, with its checksum where there is one")?;
         }
         if !self.read_whole {
-            writeln!(f, "  from what stands at its end; `backdrive bag info --check` reads every message and its checksum")?;
+            writeln!(f, "  from its summary; `backdrive bag info --check` reads every message and its checksum")?;
         }
         Ok(())
     }

@@ -15,7 +15,7 @@ pub(crate) struct JsonMessage(Value);
 /// A sentence: it is no JSON.
 pub(crate) fn parse(payload: &[u8]) -> Result<JsonMessage, String> {
     let read = serde_json::from_slice(payload).or_else(|error| serde_json::from_slice(&without_nan(payload)).map_err(|_| error));
-    read.map(JsonMessage).map_err(|error| format!("the message is no JSON: {error}"))
+    read.map(JsonMessage).map_err(|error| format!("the message is not JSON: {error}"))
 }
 
 /// Python writes what was not measured as NaN, which JSON does not have.
@@ -50,7 +50,7 @@ fn without_nan(payload: &[u8]) -> Vec<u8> {
 /// A sentence.
 pub(crate) fn check(path: &str) -> Result<(), String> {
     match path.is_empty() || path.matches('[').count() != path.matches(']').count() {
-        true => Err(format!("{path:?} is no path such as position[0] or wrench.force.x")),
+        true => Err(format!("{path:?} is not a path such as position[0] or wrench.force.x")),
         false => Ok(()),
     }
 }
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn what_is_no_json_is_an_error() {
         for text in [&b"{"[..], b"", b"\xff\xfe", b"{\"a\": NaM}"] {
-            assert!(parse(text).is_err_and(|what| what.contains("no JSON")));
+            assert!(parse(text).is_err_and(|what| what.contains("not JSON")));
         }
         assert!(parse(b"[1, [2, {\"a\": 3}]]").unwrap().numbers(2) == ["[0]", "[1][0]"]);
         assert!(check("").is_err() && check("position[0").is_err());

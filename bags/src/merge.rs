@@ -76,7 +76,7 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
         (None, _) => vec![(0, 0, 0)],
     };
     if clocks.is_empty() {
-        let what = "the bags do not say what the clocks were; give the second's lead over the first with --offset".to_string();
+        let what = "the bags do not state the clock offsets; give the second's lead over the first with --offset".to_string();
         return Err(wrong(second, "clock", what));
     }
 

@@ -51,6 +51,6 @@ mod tests {
         assert!(recover_command(&bag).ends_with(&quoted(&at("it's a bag-saved-2.mcap"))), "{}", recover_command(&bag));
         assert_eq!(recover_command(Path::new("-run.mcap")), "backdrive bag recover ./-run.mcap --bag ./-run-saved.mcap");
         let error = crate::BagError::Damaged { path: bag.clone(), offset: 7, what: "a record is cut off".to_string() }.to_string();
-        assert!(error.ends_with(&format!("{}` saves what is whole", recover_command(&bag))), "{error}");
+        assert!(error.ends_with(&format!("{}` recovers the intact part", recover_command(&bag))), "{error}");
     }
 }

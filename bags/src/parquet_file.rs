@@ -63,7 +63,7 @@ impl ParquetFile {
     pub(crate) fn open(path: &Path, memory: &Rc<Memory>) -> Result<ParquetFile, BagError> {
         let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
         let size = file.metadata().map_err(BagError::io(path))?.len();
-        let opened = guarded(|| SerializedFileReader::new(file)).and_then(|opened| opened.map_err(|error| told(&error)));
+        let opened = guarded(|| SerializedFileReader::new(file)).and_then(|opened| opened.map_err(|error| error_text(&error)));
         let reader = opened.map_err(|why| {
             let what = format!("is not a whole parquet file: {why}; if it was cut off, it has to be written again");
             BagError::File { path: path.to_owned(), what }
@@ -170,7 +170,7 @@ impl ParquetFile {
     }
 
     fn stored(&self, place: usize, column: &ColumnDescriptor) -> Result<Stored, BagError> {
-        let failed = |error: ParquetError| self.wrong(column, format!("cannot be read: {}", told(&error)));
+        let failed = |error: ParquetError| self.wrong(column, format!("cannot be read: {}", error_text(&error)));
         let mut found = Stored::default();
         let (mut flags, mut small, mut whole, mut single, mut double) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut days, mut bytes) = (Vec::new(), Vec::new());
@@ -324,7 +324,7 @@ fn half(bytes: &[u8]) -> f64 {
 }
 
 /// The crate's message, without the name of its kind of error.
-fn told(error: &ParquetError) -> String {
+fn error_text(error: &ParquetError) -> String {
     match error {
         ParquetError::General(what) | ParquetError::NYI(what) | ParquetError::EOF(what) => what.clone(),
         other => other.to_string(),

@@ -28,7 +28,7 @@ impl ProtobufType {
     /// # Errors
     /// A sentence: it is none, or does not define it.
     pub(crate) fn parse(name: &str, schema: &[u8]) -> Result<ProtobufType, String> {
-        let broken = |what: String| format!("its schema is no FileDescriptorSet: {what}");
+        let broken = |what: String| format!("its schema is not a FileDescriptorSet: {what}");
         let read = |mut pool: DescriptorPool| {
             guarded(|| pool.decode_file_descriptor_set(schema).map(|()| pool).map_err(|error| error.to_string()))
         };
@@ -70,7 +70,7 @@ impl ProtobufType {
             if let Some(entry) = rest.strip_prefix('[').and_then(|rest| rest.split_once(']')).filter(|_| field.is_list()) {
                 rest = entry.1;
             } else if field.is_list() {
-                return Err(format!("{name:?} is a list: say which, as in {name}[0]"));
+                return Err(format!("{name:?} is a list: name the element, as in {name}[0]"));
             } else if let (true, Kind::Message(entry)) = (field.is_map(), &kind) {
                 // A key may have any letters, so that what a map holds shows in the messages alone.
                 let value = entry.map_entry_value_field();
@@ -78,7 +78,7 @@ impl ProtobufType {
                     .strip_prefix('.')
                     .filter(|key| !key.is_empty())
                     .map(|_| ())
-                    .ok_or_else(|| format!("{name:?} is a map of {}: say which, as in {name}.KEY", words_of(&value)));
+                    .ok_or_else(|| format!("{name:?} is a map of {}: name the key, as in {name}.KEY", words_of(&value)));
             }
             if let (Kind::Message(inner), Some(below)) = (&kind, rest.strip_prefix('.')) {
                 (message, rest) = (inner.clone(), below);
@@ -266,7 +266,7 @@ mod tests {
     fn a_wrong_path_says_what_there_is() {
         for (path, says) in [
             ("positions", "there is no \"positions\"; there is timestamp, joints, currents"),
-            ("joints", "is a list: say which, as in joints[0]"),
+            ("joints", "is a list: name the element, as in joints[0]"),
             ("joints[0]", "is not a number; it has name, position, effort"),
             ("joints[0].name", "\"name\" is text"),
             ("joints[0].position.x", "is not followed by"),

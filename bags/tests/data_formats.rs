@@ -162,7 +162,7 @@ fn what_is_easily_taken_for_something_else_is_not() {
     }
     let says = |name: &str| import(name).expect_err(name).to_string();
     assert!(says("words.parquet").contains("words.parquet: there is no column \"t\", and none with numbers; there is a, b"));
-    assert!(says("twice.parquet").contains("both go to"));
+    assert!(says("twice.parquet").contains("both map to"));
     let report = import("odd.parquet").expect("it is imported");
     assert_eq!((report.topics.as_slice(), report.skipped.len()), (&["/recording/few".to_owned()][..], 4), "{report:?}");
     assert!(
@@ -209,8 +209,8 @@ fn the_fields_of_a_structure_are_columns() {
         import_table(&written.path("typed.mat"), &written.path("no.mcap"), &options).expect_err("it is wrong").to_string()
     };
     assert!(says(ImportOptions { variable: Some("logs".to_owned()), ..options.clone() }).contains("logs: there is none; there are t, "));
-    assert!(says(ImportOptions { variable: Some("gain".to_owned()), ..options.clone() }).contains("gain: is no structure"));
-    assert!(says(ImportOptions { time: "t".to_owned(), ..options }).contains("t: is no vector of times; vectors are time"));
+    assert!(says(ImportOptions { variable: Some("gain".to_owned()), ..options.clone() }).contains("gain: is not a structure"));
+    assert!(says(ImportOptions { time: "t".to_owned(), ..options }).contains("t: is not a vector of times; vectors are time"));
 }
 
 #[test]
@@ -278,7 +278,7 @@ fn a_wrong_dataset_is_told_with_its_file() {
     for (from, to, expected) in [
         ("\"v3.0\"", "\"v2.1\"", "codebase_version: is \"v2.1\", expected v3.0"),
         ("\"fps\": 50", "\"fps\": 0", "fps: expected a number above 0"),
-        ("[2]", "[3]", "names: has 2 names, the shape says 3"),
+        ("[2]", "[3]", "names: has 2 names, but the shape has 3"),
         ("[2]", "[1000000000000000]", "shape: expected one number, a value a joint, from 1 to 10000"),
         ("{", "", "meta/info.json"),
     ] {

@@ -75,5 +75,5 @@ fn what_stands_at_the_end_says_the_same_as_all_messages() {
     std::fs::write(&path, &bytes[..bytes.len() - 20]).expect("it writes");
     let cut = info(&path).expect("it is summed up");
     assert!(cut.read_whole && !cut.ended_cleanly && cut.messages == whole.messages);
-    assert!(cut.to_string().contains("has no end that tells, so all of it was read"), "{cut}");
+    assert!(cut.to_string().contains("has no summary at its end, so all of it was read"), "{cut}");
 }

@@ -158,7 +158,7 @@ fn what_is_no_bag_is_told() {
     let path = dir.path().join("x.mcap");
     for bytes in [&b""[..], b"t,x\n0,1\n", b"\x89MCAP"] {
         std::fs::write(&path, bytes).expect("it writes");
-        let error = Reader::open(&path).expect_err("it is no bag").to_string();
+        let error = Reader::open(&path).expect_err("not a bag").to_string();
         assert!(error.contains("not an MCAP file"), "{error}");
     }
     assert!(Reader::open(&dir.path().join("absent.mcap")).expect_err("it is not there").to_string().contains("absent.mcap"));

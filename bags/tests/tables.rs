@@ -195,7 +195,7 @@ fn columns_go_where_they_are_sent() {
     options.columns[1] = map("g", Quantity::Effort, 0, 1.0);
     assert!(import_csv(&table, &bag, &options).expect_err("no such column").to_string().contains("disp_in"));
     options.columns[1] = map("f", Quantity::Position, 1, 1.0);
-    assert!(import_csv(&table, &bag, &options).expect_err("twice the same place").to_string().contains("both go to"));
+    assert!(import_csv(&table, &bag, &options).expect_err("twice the same place").to_string().contains("both map to"));
 }
 
 #[test]
@@ -216,16 +216,17 @@ fn a_bad_table_is_told_with_its_line() {
         ("t;x\n0,1;1\n0,2;2\n", "line 2: column \"t\": \"0,1\" is not a number; write decimal points"),
         (
             "t;x\n0;1,5\n1;2,5\n",
-            "no column of numbers beside the times; column \"x\" holds something that is no number, first in line 2: \"1,5\"; write decimal points",
+            "no numeric column besides the times; column \"x\" holds something that is not a number, first in line 2: \"1,5\"; write \
+                decimal points",
         ),
         ("time, s;x, mm\n0,1;1,5\n0,2;2,5\n", "there is no column \"t\", and none with numbers; there is time, x"),
         ("# t x\n0 1\n1 2\n", "there is no heading"),
         ("t,x,t\n0,1,5\n1,2,6\n", "line 1: two columns are called \"t\""),
-        ("t,q[0],q(0)\n0,1,5\n1,2,6\n", "both go to position[0] of /recording/q_0_; say with --map"),
+        ("t,q[0],q(0)\n0,1,5\n1,2,6\n", "both map to position[0] of /recording/q_0_; give their topics with --map"),
         ("t [mm],x\n0,1\n1,2\n", "is in mm, a length"),
         (
             "t,x\n0,1\n1000000,2\n2000000,3\n",
-            "1000000.0 s apart as a rule, which no recording is: say their unit, in the heading or as --time \"t [ns]\"",
+            "usually 1000000.0 s apart, which is implausible: state their unit, in the heading or as --time \"t [ns]\"",
         ),
         ("t,x\n3e9,1\n", "no time"),
     ] {
@@ -350,7 +351,11 @@ fn objects_in_a_matlab_file_do_not_hide_its_vectors() {
     std::fs::write(&table, file).expect("it writes");
     let report = import_table(&table, &bag, &ImportOptions::default()).expect("it imports");
     assert_eq!((report.rows, report.topics.as_slice()), (2, &["/recording/x".to_owned()][..]));
-    assert_eq!(report.notes, ["left out, for they are no numbers as long as t: remark (an object such as a table, a string or a date)"]);
+    assert_eq!(
+        report.notes,
+        ["omitted, because they are not numeric columns as long as t: remark (an object such as a table, a string or \
+        a date)"]
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What every core is: a function of (time, inputs, its state).
 
-use crate::live_margin::Told;
+use crate::live_margin::MarginEstimate;
 use backdrive_msgs::{Gains, Sample};
 
 /// The step that is being done.
@@ -80,7 +80,7 @@ pub trait Core: Send {
     }
 
     /// The loop's stability margin, if the core can estimate it.
-    fn margin(&self) -> Option<Told> {
+    fn margin(&self) -> Option<MarginEstimate> {
         None
     }
 }

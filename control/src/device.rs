@@ -13,9 +13,7 @@ pub enum DeviceError {
     #[error("model \"{0}\" has no [[axes]]: a graph needs to know where it is held, pushed and read")]
     NoAxes(String),
     /// A hand is to be estimated where none holds the model.
-    #[error(
-        "model \"{0}\": nothing holds it whose firmness could be estimated; give the canceller a grip, or leave hand = \"estimated\" out"
-    )]
+    #[error("model \"{0}\": it has no grip whose stiffness could be estimated; give the canceller a grip, or omit hand = \"estimated\"")]
     NoHand(String),
     /// A hand cannot change its grip where it is not one of springs and dampers.
     #[error("model \"{0}\": grip_changes need a grip of springs and dampers that holds it; name one such as plant/grips/normal.toml")]

@@ -3,7 +3,7 @@
 use crate::core::{Core, Events, Port, Tick};
 use crate::freshness::Freshness;
 use crate::guard::Guard;
-use crate::live_margin::{Edge, LiveMargin, RingDown, Told};
+use crate::live_margin::{Edge, LiveMargin, MarginEstimate, RingDown};
 use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
 /// A gain that ramps to what is wanted in a straight line.
@@ -248,9 +248,11 @@ impl Core for Backward {
         Some((self.gains.mu.now, self.lambda_in_force()))
     }
 
-    fn margin(&self) -> Option<Told> {
+    fn margin(&self) -> Option<MarginEstimate> {
         let (mu, lambda) = (self.gains.mu.now, self.lambda_in_force());
-        let of = |axis: usize| Told::of(axis, self.live[axis].as_ref().map(LiveMargin::edge), mu, lambda, self.ring[axis].decay_per_s());
+        let of = |axis: usize| {
+            MarginEstimate::of(axis, self.live[axis].as_ref().map(LiveMargin::edge), mu, lambda, self.ring[axis].decay_per_s())
+        };
         (0..self.axes.min(MAX_AXES)).map(of).reduce(|a, b| if b.is_tighter_than(&a) { b } else { a })
     }
 }

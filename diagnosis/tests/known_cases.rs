@@ -113,7 +113,11 @@ fn a_speed_that_contradicts_its_position_is_told_and_left_out() {
         let told = found.remarks.iter().find(|r| r.about == "velocity").unwrap();
         assert!(told.signal == "speed" && told.text.contains(gain), "{told}");
         near(number(&found, "coulomb", "force"), 4.0e-3, 0.02);
-        assert!(!found.remarks.iter().any(|r| r.about == "repeats" && r.text.contains("no model can do better")), "{:?}", found.remarks);
+        assert!(
+            !found.remarks.iter().any(|r| r.about == "repeats" && r.text.contains("no model can predict it better")),
+            "{:?}",
+            found.remarks
+        );
     }
 }
 

@@ -30,7 +30,7 @@ fn every_entry_has_a_unit_a_reason_and_a_name_of_its_own() {
     let rows = Tuning::default().rows();
     let mut names = HashSet::new();
     for row in &rows {
-        let (_, why) = row.evidence.told();
+        let (_, why) = row.evidence.kind_and_reason();
         assert!(!row.unit.is_empty() && !row.decides.is_empty() && !why.is_empty(), "{row:?}");
         assert!(names.insert(row.name.clone()), "{} stands twice", row.name);
         if let Evidence::Measured(text) = row.evidence {

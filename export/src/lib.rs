@@ -48,8 +48,8 @@ fn of_robot(model: &Model) -> Result<Vec<LeftOut>, ExportError> {
     if !arm.points.is_empty() {
         let names: Vec<&str> = arm.points.iter().map(|point| model.place_name(Some(point.body))).collect();
         return Err(ExportError::new(format!(
-            "it has points of the robot ({}), on which elements and inputs act through the transposed Jacobian; an export holds joints and what acts on \
-             them: export a model file of the same arm without [point.NAME], and let the graph's file name the one with them",
+            "it has points of the robot ({}), and an export contains only joints and elements between them. Export a model file of the same \
+             arm without [point.NAME], and let the graph's file name the one with points",
             names.join(", ")
         )));
     }

@@ -59,7 +59,7 @@ fn of_path(path: &Path, options: &Options, out: &mut Vec<Recording>) -> Result<(
     }
     if is_rosbag(path) {
         let word = shell_word(&file);
-        let what = format!("is a ROS bag; make it MCAP first: backdrive bag import {word} --bag {}.mcap", word.trim_end_matches('/'));
+        let what = format!("is a ROS bag; convert it to MCAP first: backdrive bag import {word} --bag {}.mcap", word.trim_end_matches('/'));
         return Err(InspectError::of(&file, what));
     }
     if path.is_dir() {
@@ -105,7 +105,7 @@ fn made(file: &str, raw: RawRecording, options: &Options) -> Result<Vec<Recordin
     for mut piece in pieces {
         if piece.streams.iter().all(|stream| stream.times.len() < LEAST_SAMPLES) {
             let rows = piece.streams.iter().map(|stream| stream.times.len()).max().unwrap_or(0);
-            return Err(InspectError::of(&piece.file, format!("has {rows} rows; {LEAST_SAMPLES} are the fewest that say anything")));
+            return Err(InspectError::of(&piece.file, format!("has {rows} rows; at least {LEAST_SAMPLES} are needed")));
         }
         even(&mut piece);
         out.push(piece);

@@ -84,10 +84,10 @@ fn by_data(recording: &mut Recording) {
             let Some(found) = follow(&coarse(*command), &coarse(*position), (-lags, lags)) else { continue };
             // Late by half a step at least, or either could be the other's command.
             if found.explained > EXPLAINED && found.lag > 0.5 {
-                let why = format!("{} follows it {:.0} ms late", recording.signals[*position].name, 1e3 * found.lag * period);
+                let why = format!("{} follows it with a lag of {:.0} ms", recording.signals[*position].name, 1e3 * found.lag * period);
                 said.push((*command, Quantity::Command, 0.3 + 0.45 * found.explained, why));
                 if unknown.contains(position) && !said.iter().any(|(place, ..)| place == position) {
-                    let why = format!("it follows {} late", recording.signals[*command].name);
+                    let why = format!("it follows {} with a lag", recording.signals[*command].name);
                     said.push((*position, Quantity::Position, 0.3 + 0.45 * found.explained, why));
                 }
             }

@@ -79,10 +79,10 @@ impl Report {
         };
         let plural = |count: usize, word: &str| if count == 1 { format!("1 {word}") } else { format!("{count} {word}s") };
         match (wrong, notes) {
-            (0, 0) => format!("{files}: nothing wrong was found"),
-            (0, notes) => format!("{files}: nothing wrong was found, {} to know", plural(notes, "thing")),
-            (1, _) => format!("{files}: 1 thing is wrong"),
-            (wrong, _) => format!("{files}: {wrong} things are wrong"),
+            (0, 0) => format!("{files}: no problem found"),
+            (0, notes) => format!("{files}: no problem found; {}", plural(notes, "note")),
+            (1, _) => format!("{files}: 1 problem found"),
+            (wrong, _) => format!("{files}: {wrong} problems found"),
         }
     }
 }

@@ -9,7 +9,7 @@ pub fn limited(recording: &Recording, response: &Response, limit: &RateLimit) ->
     let [from, to] = limit.rows;
     let times = [from as f64 * recording.period, to as f64 * recording.period];
     let message = format!(
-        "{:?} moves at no more than {:.4} per s while {:?} goes on: {:.0} % of the time behind is spent at this speed",
+        "the speed of {:?} does not exceed {:.4} per s while {:?} moves on: {:.0} % of the time that it lags is spent at this speed",
         response.position,
         limit.speed,
         response.command,
@@ -18,7 +18,7 @@ pub fn limited(recording: &Recording, response: &Response, limit: &RateLimit) ->
     let mut finding =
         Finding::new(FindingKind::RateLimit, &recording.file, &[&response.position, &response.command], message).at(&response.joint);
     finding.time_s = Some(times);
-    finding.todo("command slower motion, or state the limit in the drive: a linear model does not hold there").sure(0.9)
+    finding.todo("command slower motion, or state the limit in the model of the drive: a linear model is not valid there").sure(0.9)
 }
 
 /// Removes what another finding explains.

@@ -45,7 +45,7 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
         };
     }
     if columns.iter().all(|column| column.values.len() < 2) {
-        return Err("holds no two rows of numbers: record again, or give the file that has them".to_string());
+        return Err("contains fewer than two rows of numbers: record again, or name the file that has them".to_string());
     }
     let is_clock = |column: &RawColumn| {
         let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
@@ -67,10 +67,10 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
         });
     let Some((place, column)) = place.and_then(|place| Some((place, columns.get(place)?))) else {
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        return Err(format!("no column holds times; there is {}: say with --rate HZ how many rows a second has", names.join(", ")));
+        return Err(format!("no column holds times; there is {}: give the sampling rate with --rate HZ", names.join(", ")));
     };
     if let Some(other) = &column.other {
-        return Err(format!("column {:?} holds {other}; times are numbers", column.name));
+        return Err(format!("column {:?} contains {other}; times must be numbers", column.name));
     }
     let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
     let step = median(&steps);
@@ -81,11 +81,11 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
         None => {
             let unit = ["ms", "us", "ns"].into_iter().filter_map(|unit| units::parse(unit).ok());
             let unit = unit.into_iter().find(|unit| step * unit.factor < 1.0 / SLOWEST_HZ);
-            let unit = unit.ok_or_else(|| {
-                format!("column {:?}: its steps of {step} are in no unit of time that is known; say --rate HZ", column.name)
-            })?;
+            let unit =
+                unit.ok_or_else(|| format!("column {:?}: its steps of {step} match no known unit of time; give --rate HZ", column.name))?;
             let note = format!(
-                "the times in {:?} step by {step} and are taken for {}: say so in the set: [columns] t = {{ column = {:?}, unit = {:?} }}",
+                "the times in {:?} have steps of {step} and are assumed to be in {}: state it in the set: [columns] t = {{ column = {:?}, \
+                    unit = {:?} }}",
                 column.name, unit.name, column.name, unit.name
             );
             (unit.factor, Some(note))

@@ -83,7 +83,7 @@ fn address(name: &str) -> Result<Ipv4Addr, AskedError> {
 pub fn place(graph: &Graph, asked: &Meeting) -> Result<Place, AskedError> {
     let (wire, host, secret) = (asked.wire, asked.host.as_deref(), asked.secret.as_deref());
     if secret.is_some() && host.is_none() {
-        return Err(wrong("--secret is what several hosts share; leave it out without --host"));
+        return Err(wrong("--secret is for several hosts; omit it without --host"));
     }
     let wire = match (wire, host) {
         (Some(Wire::Iceoryx2) | None, None) => return Ok(Place::default()),
@@ -94,7 +94,7 @@ pub fn place(graph: &Graph, asked: &Meeting) -> Result<Place, AskedError> {
     if let Some(name) = host {
         let file = graph.path.display();
         if graph.hosts.is_empty() {
-            return Err(wrong(format!("{file}: has no [hosts], so --host means nothing here")));
+            return Err(wrong(format!("{file}: has no [hosts], so --host has no effect; omit it")));
         }
         let Some(here) = graph.host(name) else {
             let known = graph.hosts.iter().map(|h| h.name.as_str()).collect::<Vec<_>>().join(", ");

@@ -70,7 +70,7 @@ pub fn bridge(options: &Options, stop: &AtomicBool, note: &(dyn Fn(&str) + Sync)
     let paths = find(options.run.as_deref())?;
     let place = Place::read(&paths).map_err(CarryError::machine)?;
     if place.wire == Wire::Ros2 {
-        return Err(CarryError::input(format!("run {} speaks ROS 2 already and needs no bridge", paths.id())));
+        return Err(CarryError::input(format!("run {} uses ROS 2 already and needs no bridge", paths.id())));
     }
     let mut graph = read_graph(&paths).map_err(CarryError::input)?;
     if place.host.is_none() {
@@ -84,7 +84,7 @@ pub fn bridge(options: &Options, stop: &AtomicBool, note: &(dyn Fn(&str) + Sync)
     if !options.both_ways {
         if !back.is_empty() {
             note(&format!(
-                "nothing is taken from ROS 2: {} topics of other hosts do not reach the nodes here; add --both-ways if they should",
+                "nothing is received from ROS 2: {} topics of other hosts do not reach the nodes here; add --both-ways if they should",
                 back.len()
             ));
         }

@@ -70,12 +70,12 @@ impl End {
                 let name = signal.map(|s| format!(" ({})", s.as_str())).unwrap_or_default();
                 let hint = match signal {
                     Some(Signal::SIGBUS) => "; /dev/shm may be full",
-                    Some(Signal::SIGKILL) => "; if nobody killed it, the machine ran out of memory",
+                    Some(Signal::SIGKILL) => "; if it was not killed by a user, the machine ran out of memory",
                     _ => "",
                 };
                 format!("was killed by signal {number}{name}{hint}")
             }
-            (None, None) => "is gone, and the system does not say how".to_string(),
+            (None, None) => "has ended, and the system does not report how".to_string(),
         }
     }
 }

@@ -82,7 +82,8 @@ pub enum LaunchError {
     },
     /// Another run on this machine speaks for a node in the same ROS domain.
     #[error(
-        "ROS domain {domain}: another run on this machine speaks here too, as node `{node}`; end that first, or choose another ROS domain with --domain"
+        "ROS domain {domain}: another run on this machine uses it too, as node `{node}`; end that first, or choose another ROS domain \
+            with --domain"
     )]
     DomainTaken {
         /// The domain.

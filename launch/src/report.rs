@@ -180,7 +180,7 @@ impl std::fmt::Display for Cause {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Cause::Completed => write!(f, "completed"),
-            Cause::EndedEarly { node, steps } => write!(f, "node `{node}` ended by itself after {steps} steps"),
+            Cause::EndedEarly { node, steps } => write!(f, "node `{node}` ended on its own after {steps} steps"),
             Cause::Stopped { by } => write!(f, "stopped by {by}"),
             Cause::Stranger { node, text } => write!(f, "a stranger on the network, refused by `{node}`: {text}"),
             Cause::NodeDied { node, how } => write!(f, "node `{node}` {how}"),

@@ -38,7 +38,7 @@ pub fn read(path: &Path) -> Result<Key, String> {
         .map_err(|e| format!("{name}: cannot be read: {e}; make a secret with `backdrive secret {name}` and copy it to each host"))?;
     let meta = file.metadata().map_err(|e| format!("{name}: cannot be read: {e}"))?;
     if !meta.is_file() {
-        return Err(format!("{name}: is no regular file; make a secret with `backdrive secret FILE`"));
+        return Err(format!("{name}: is not a regular file; make a secret with `backdrive secret FILE`"));
     }
     if meta.mode() & 0o077 != 0 {
         return Err(format!("{name}: others can read it (mode {:o}); `chmod 600 {name}`", meta.mode() & 0o777));

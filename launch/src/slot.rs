@@ -170,7 +170,7 @@ impl Slot {
     pub fn how(&self, end: End) -> String {
         match (&self.failed, self.done) {
             (Some((error, _)), _) => error.clone(),
-            (None, true) => format!("ended by itself after {} steps", self.steps()),
+            (None, true) => format!("ended on its own after {} steps", self.steps()),
             (None, false) => end.words(),
         }
     }
@@ -186,7 +186,7 @@ impl Slot {
     pub fn lack(&self) -> String {
         let name = self.plan.label();
         match (&self.missing[..], self.created) {
-            ([], false) => format!("{name}: has not said a word; does the program speak the node protocol?"),
+            ([], false) => format!("{name}: has not responded; does the program implement the node protocol?"),
             ([], true) => format!("{name}: is still connecting"),
             (missing, _) => format!("{name}: {}", missing.join("; ")),
         }
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn says_what_it_lacks() {
         let mut slot = Slot::new(NodePlan { name: "slave".to_string(), ..NodePlan::default() }, Instant::now());
-        assert!(slot.lack().contains("not said a word"));
+        assert!(slot.lack().contains("not responded"));
         slot.created = true;
         assert!(slot.lack().contains("still connecting"));
         slot.missing = vec!["/a: no publisher".to_string(), "/b: no publisher".to_string()];

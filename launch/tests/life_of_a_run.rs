@@ -64,7 +64,7 @@ async fn who_is_not_ready_is_named() -> Outcome {
     let options = SuperviseOptions { ready_timeout: Duration::from_secs(2), ..options(temp.path()) };
     let told = run(temp.path(), plan(Clock::Lockstep, None, nodes), options).await.err().map(|e| e.to_string()).unwrap_or_default();
     assert!(told.contains("slave: /slave/measured_js: no publisher"), "{told}");
-    assert!(told.contains("hand: has not said a word"), "{told}");
+    assert!(told.contains("hand: has not responded"), "{told}");
     assert!(!told.contains("master:"), "{told}");
     Ok(())
 }

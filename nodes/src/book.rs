@@ -5,7 +5,7 @@
 use crate::sentences::sentence;
 use crate::stage::{Clock, Timing};
 use backdrive_control::core::Events;
-use backdrive_control::live_margin::Told;
+use backdrive_control::live_margin::MarginEstimate;
 use backdrive_msgs::text::Text;
 use backdrive_msgs::{Event, Gains, LAYOUT, Margin, NOT_MEASURED, Status, source_id};
 
@@ -89,12 +89,12 @@ impl Book {
     }
 
     /// The margin after `step`, every 0.1 s of the graph's time.
-    pub fn margin(&mut self, step: u64, stamp_ns: i64, now: impl FnOnce() -> Option<Told>) -> Option<Margin> {
+    pub fn margin(&mut self, step: u64, stamp_ns: i64, now: impl FnOnce() -> Option<MarginEstimate>) -> Option<Margin> {
         let steps = step + 1;
         if steps < self.margin_due {
             return None;
         }
-        let Told { axis, known, gain, factor, deviation, frequency_hz, decay_per_s } = now()?;
+        let MarginEstimate { axis, known, gain, factor, deviation, frequency_hz, decay_per_s } = now()?;
         self.margin_due = (steps / self.status_every + 1) * self.status_every;
         let sequence = self.margins;
         self.margins += 1;

@@ -15,7 +15,7 @@ use backdrive_control::engine::EngineNode;
 use backdrive_control::exciter::Exciter;
 use backdrive_control::guard::Guard;
 use backdrive_control::hand::HandBank;
-use backdrive_control::live_margin::Told;
+use backdrive_control::live_margin::MarginEstimate;
 use backdrive_control::master::Master;
 use backdrive_control::mechanism::Mechanism;
 use backdrive_control::observer::{DesignError, ObserverNode, Quantity, System, UnknownInput, design};
@@ -347,7 +347,7 @@ impl Core for Wired {
         self.core.gains()
     }
 
-    fn margin(&self) -> Option<Told> {
+    fn margin(&self) -> Option<MarginEstimate> {
         self.core.margin()
     }
 }

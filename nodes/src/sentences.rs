@@ -16,9 +16,9 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("force_stale", "no force has come for", Some("steps: the master's force decays to zero")),
     ("guard_growing", "an oscillation grows: the guard lowers lambda to", Some("")),
     ("guard_persistent", "an oscillation does not die: the guard lowers lambda to", Some("")),
-    ("guard_runaway", "force and master run away together: the guard lowers lambda to", Some("")),
-    ("guard_thin_margin", "the dither shows the edge near: the guard lowers lambda to", Some("")),
-    ("hand_holds", "the hand holds, over the grip of the canceller's file, times", Some("")),
+    ("guard_runaway", "force and master diverge together: the guard lowers lambda to", Some("")),
+    ("guard_thin_margin", "the dither shows that the stability limit is near: the guard lowers lambda to", Some("")),
+    ("hand_holds", "estimated grip stiffness, relative to the canceller's file", Some("")),
     ("input_gone", "an input's publisher is silent and is no longer waited for", None),
     ("input_back", "an input that was silent is back", None),
     ("joined_late", "joined a graph that was already running, at step", Some("")),
@@ -30,7 +30,7 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("slave_follows", "commands arrive again: the slave follows", None),
     ("slave_holds", "no command has come for", Some("steps: the slave holds")),
     ("state_not_finite", "the simulated state is not finite at", Some("s: the model or its step size does not fit")),
-    ("steps_skipped", "too far behind: goes on at the step now due, having skipped", Some("steps")),
+    ("steps_skipped", "too late: continues at the current step; steps skipped:", Some("steps")),
     ("valve_fully_open", "the rig asks for more than its valve gives, at", Some("s")),
 ];
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SequenceError {
     /// An input's topic has no publisher.
-    #[error("node `{node}`: nobody publishes {topic}")]
+    #[error("node `{node}`: no node publishes {topic}")]
     NoPublisher {
         /// Who listens.
         node: String,
@@ -31,7 +31,7 @@ pub enum SequenceError {
     #[error("{} wait for each other: one connection on the way must have a delay", .0.join(", "))]
     Loop(Vec<String>),
     /// A rate that is no rate.
-    #[error("a rate of {0} Hz cannot be kept")]
+    #[error("a rate of {0} Hz is not possible")]
     Rate(String),
 }
 

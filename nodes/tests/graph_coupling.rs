@@ -57,7 +57,7 @@ fn what_is_wrong_is_said_with_what_there_is() {
     let hand = hand.unwrap_err();
     assert!(hand.contains("force of the hand") && hand.contains("\"hand\""), "{hand}");
     let no_loop = Graph::load(&file("launch/identify.toml"), &with("wave")).unwrap_err().to_string();
-    assert!(no_loop.contains("--coupling means nothing here"), "{no_loop}");
+    assert!(no_loop.contains("--coupling has no effect"), "{no_loop}");
 }
 
 #[test]

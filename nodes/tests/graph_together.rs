@@ -57,7 +57,7 @@ fn what_is_wrong_is_said_with_file_and_key() {
 fn what_cannot_share_a_process() {
     let master = |line: &'static str| move |text: String| text.replace("kind = \"master\"\n", &format!("kind = \"master\"\n{line}\n"));
     let told = read("[\"master\", \"canceller\"]", master("command = [\"./own\"]"), "contact.toml").unwrap_err();
-    assert!(told.contains("\"master\" is a program of your own"), "{told}");
+    assert!(told.contains("\"master\" is an external program"), "{told}");
     let realtime = |text: String| master("restart = true")(text.replace("clock = \"lockstep\"", "clock = \"realtime\""));
     let told = read("[\"master\", \"canceller\"]", realtime, "contact.toml").unwrap_err();
     assert!(told.contains("both or neither"), "{told}");

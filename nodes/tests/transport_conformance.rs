@@ -617,9 +617,9 @@ mod strangers {
     fn nothing_is_taken_of_who_has_no_tag_another_run_or_another_key() {
         let domain = Domain::new();
         let (who, moves) = said_of(&domain, open(&domain));
-        assert!(who.starts_with("a stranger speaks here (GID ") && moves, "{who}");
+        assert!(who.starts_with("a program outside the run sends on this topic (GID ") && moves, "{who}");
         let (who, _) = said_of(&domain, open(&domain).with_identity(identity("b2")));
-        assert_eq!(who, "run b2 speaks here too");
+        assert_eq!(who, "run b2 sends on this topic too");
         let (who, _) = said_of(&domain, open(&domain).with_identity(identity("a1")));
         assert!(who.starts_with("a stranger forges tags"), "{who}");
     }

@@ -3,14 +3,15 @@
 use crate::offered::Step;
 use backdrive_report::{Page, Table};
 
-/// The terms of a page.
+/// The terms of a page, folded.
 pub fn ending(page: &mut Page, terms: &[(&str, &str)]) {
-    page.section("Terms");
     let mut table = Table::new(["term", "meaning"]);
     for (term, meaning) in terms {
         table.push([*term, *meaning]);
     }
-    page.table(table);
+    page.details("Terms", |inside| {
+        inside.table(table);
+    });
 }
 
 /// The box of what to do next, with the commands that do it.

@@ -26,7 +26,8 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
         page.lead(
             headline.tone(),
             &format!(
-                "{} {} cases: {}; false alarms {}. Of effects that the nominal model's numbers cannot take on ({SHOWS} noise floors and more after a refit): {}.",
+                "{} {} cases: {}; false alarms {}. Visible effects only (residual of at least {SHOWS} sd of the noise after a refit of the \
+                    nominal model): {}.",
                 headline.sentences().join(" "),
                 cases.len(),
                 summary.all,
@@ -39,18 +40,21 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
         }
         page.section("What was found");
         page.table(table(cases));
-        page.section("What was taken for what");
+        page.section("Confusions");
         page.table(confusion(&summary));
         if options.gains {
-            page.section("What it is worth");
+            page.section("Effect on the stability limit");
         }
         for group in &summary.worth {
             page.text(&format!(
-                "{}, {} cases: median of the stable gain over the best of what a user has without a diagnosis (no canceller, second order, linear refitted), in how many cases it is below that \
-                 without a canceller, and, as it was told before, over the better of the two linear ones alone, which flatters: they are often far below none.{}",
+                "{}, {} cases: median of the stable gain, relative to the best available without a diagnosis (no canceller, second order, \
+                 linear refitted). Then: cases below no canceller, and the gain relative to the better linear canceller alone, which is \
+                 often far below none.{}",
                 group.kind,
                 group.cases,
-                group.recovery_s.map_or_else(String::new, |s| format!(" After a change of the grip the loop with the hand estimated settles in {s:.2} s (median)."))
+                group.recovery_s.map_or_else(String::new, |s| format!(
+                    " After a change of the grip the loop with the hand estimated settles in {s:.2} s (median)."
+                ))
             ));
             page.table(worth(group));
         }
@@ -65,16 +69,19 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
     }
     page.section("How this was done");
     page.text(&format!(
-        "A master hides effects drawn from a seed (--seed {}). The file that says which was sealed first: its SHA-256 is printed before anything is \
-         recorded, and stands in the title of every bag. Only the process of the hidden plant opens it, and, after verdict.json is written, the scorer. \
-         The diagnosis is a process of its own that gets the nominal model and the bags. Where the nominal numbers are \"refitted\", they were first \
-         fitted to another session of the hidden plant, so that they have taken on what they can of what is concealed. The stable gain is that of the contact script {}, searched up \
-         to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
-         the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
-         model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
-         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained, or {} noise floors and more of what was held out; \"hand estimated\" the diagnosed model behind no high-pass, the firmness of the hand estimated while the loop runs \
-         (docs/canceller.md), and none where the chosen one would be none for what is unexplained. The changing hand is that of {}. Edges are searched with the loop in one process; at the edges without \
-         canceller, with the diagnosed, the chosen and the hand-estimating one the graph itself is run, its processes over shared memory.",
+        "A master has concealed effects, drawn from a seed (--seed {}). The file with the truth is sealed first: its SHA-256 is printed \
+         before anything is recorded, and is in the title of every bag. Only the process of the hidden plant opens it, and, after \
+         verdict.json is written, the scorer. The diagnosis is a separate process that receives the nominal model and the bags. \
+         \"Refitted\" nominal parameters were first fitted to another session of the hidden plant, so they absorb part of the concealed \
+         effects. The stable gain is that of the contact script {}, searched up to 50 to within 3 %, with a high-pass of {} Hz on the \
+         canceller. \"Linear, refitted\" is the nominal model with its parameters fitted to the session. \"Second order\" is one mass \
+         with spring and damper, fitted to the recordings in which the hand holds still. \"Chosen\" is the diagnosed model with the share \
+         of its estimate that maximises the worst stable gain over grips 20 % softer to 20 % stiffer, for the diagnosed model and its \
+         close rivals as the master. It is no canceller if the verdict leaves an effect unexplained, or a held-out residual of at least \
+         {} sd of the noise. \"Hand estimated\" is the diagnosed model without high-pass, with the grip stiffness estimated during the run \
+         (docs/canceller.md); it is no canceller if an effect is unexplained. The changing hand is that of {}. Limits are searched with \
+         the loop in one process. Near the limits without canceller and with the diagnosed, chosen and hand-estimating cancellers, the \
+         graph is also run live, with its processes over shared memory.",
         options.seed,
         options.contact.display(),
         options.high_pass_hz,
@@ -82,8 +89,8 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
         options.regrip.display()
     ));
     page.text(
-        "What another number of the nominal model does as well, or a constant force on a handle whose hand nobody measured, no recording can tell: there naming \
-         nothing is right. The second count, of effects that stay away from the refitted nominal model, has none of those.",
+        "Some effects are equivalent to a changed parameter, or to a constant force of an unmeasured hand; no recording shows them, and \
+         naming none is right. The count of visible effects excludes these.",
     );
     if let Some(case) = cases.first() {
         let truth = options.out.join(&case.name).join("sealed/truth.json");
@@ -97,13 +104,10 @@ pub fn page(options: &Options, cases: &[Case]) -> Page {
 /// The terms of the page.
 const TERMS: [(&str, &str); 6] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("stable to", "the highest gain found at which what oscillates in contact dies out"),
-    ("canceller", "takes the master's own motion under the reflected force out of the command, by the model named"),
-    ("noise floor", "standard deviation of the sensor noise: an error of 1 cannot be improved on"),
-    (
-        "best of others",
-        "the best of no canceller and the two with a linear model, fitted to the session: what a user has without a diagnosis",
-    ),
+    ("stable to", "the highest gain found at which oscillations in contact decay"),
+    ("canceller", "subtracts the master's induced motion from the command, using the named model"),
+    ("noise floor", "standard deviation of the sensor noise: an error of 1 cannot be reduced further"),
+    ("best of others", "the best of no canceller and the two with a linear model fitted to the session: available without a diagnosis"),
     ("over linear", "over the better of the two cancellers with a linear model alone"),
 ];
 
@@ -135,7 +139,7 @@ fn lead(page: &mut Page, case: &Case) {
 
 fn one(page: &mut Page, case: &Case) {
     if !case.gains.is_empty() {
-        page.figure(gains(case), "Highest stable μλ against how firmly the hand grips, 1 being its grip in the session.");
+        page.figure(gains(case), "Highest stable μλ against the grip stiffness relative to the session.");
     }
     let mut because = Table::new(["canceller", "hand", "stable to", "because"]);
     for gain in &case.gains {
@@ -143,28 +147,31 @@ fn one(page: &mut Page, case: &Case) {
         because.push([gain.canceller.to_string(), gain.hand.to_string(), stable, gain.because.clone()]);
     }
     let [given, refitted, diagnosed] = case.held_out.map(|x| x.map_or("-".to_string(), percent));
-    page.text(&format!(
-        "Concealed: {}. Found: {}. In its own words: {}.",
-        concealed(case),
-        found(case),
-        case.sentence.trim_end_matches('.')
-    ));
-    page.text(&format!("Error on recordings that no fit has seen: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
-    let hand = if case.shows_hand { "The bags hold what the hand wants." } else { "Nobody measured the hand: it was found with the rest." };
-    let share = case.share.map_or_else(String::new, |share| format!(" Share of the estimate that was chosen: {}.", number(share)));
-    let nominal = if case.refitted { " The nominal model's numbers were refitted to a session before." } else { "" };
+    page.text(&format!("Concealed: {}. Found: {}. Verdict: {}.", concealed(case), found(case), case.sentence.trim_end_matches('.')));
+    page.text(&format!("Error on held-out recordings: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
+    let hand = if case.shows_hand {
+        "The bags contain the intent of the hand."
+    } else {
+        "The hand was not measured: it was estimated with the \
+        other unknowns."
+    };
+    let share = case.share.map_or_else(String::new, |share| format!(" Chosen share of the estimate: {}.", number(share)));
+    let nominal = if case.refitted { " The nominal parameters were refitted to a session before." } else { "" };
     page.text(&format!("{hand}{nominal}{share} Seal: {}.", case.sealed));
     if !case.gains.is_empty() {
         page.table(by_hand(case));
         if let Some(time) = case.recovery_s {
-            page.text(&format!("After a change of the grip, at half the stable gain of the changing hand, the loop with the hand estimated settles in {time:.2} s (median); the hand's own move is 0.15 s of it."));
+            page.text(&format!(
+                "After a change of the grip, at half the stable gain of the changing hand, the loop with the hand estimated settles in \
+                {time:.2} s (median). The hand's own motion takes 0.15 s of it."
+            ));
         }
-        page.details("What ends each stable range", |inside| {
+        page.details("What limits each stable range", |inside| {
             inside.table(because);
         });
     }
     if !case.live.is_empty() {
-        page.text("The running graph, with the hidden plant's process as its master, just below and just above those edges:");
+        page.text("The running graph, with the hidden plant's process as its master, just below and just above those limits:");
         let mut table = Table::new(["canceller", "μλ", "should be", "was"]);
         for run in &case.live {
             let tone = if run.agrees() { Tone::Good } else { Tone::Warning };
@@ -230,7 +237,8 @@ fn ratios(cases: &[Case]) -> Figure {
 }
 
 fn table(cases: &[Case]) -> Table {
-    let headers = ["case", "hand", "nominal numbers", "concealed", "found", "right", "error: refitted", "in noise floors", "diagnosed"];
+    let headers =
+        ["case", "hand", "nominal parameters", "concealed", "found", "right", "error: refitted", "in sd of the noise", "diagnosed"];
     let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("gain: {c}"))));
     for case in cases {
         let right = case.is_right();

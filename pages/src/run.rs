@@ -26,15 +26,12 @@ const IMPACT_S: f64 = 0.3;
 /// The terms of the page.
 const TERMS: [(&str, &str); 7] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("x_u, x_m, x_c, x_s", "position of: what the hand wants, the master, the command sent to the slave, the slave"),
+    ("x_u, x_m, x_c, x_s", "positions of the hand's intent, the master, the command to the slave, and the slave"),
     ("F_f, F_s", "force reflected on the master; force of the environment on the slave"),
-    ("stable", "what oscillates while the hand holds still in contact dies out"),
-    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
-    (
-        "loop time",
-        "from the begin of a step of a node to its end, waiting for its inputs included; p50 half of the steps are faster, p99 all but one in a hundred",
-    ),
-    ("canceller", "takes the master's own motion under the reflected force out of the command (induced master motion)"),
+    ("stable", "oscillations decay while the hand holds still in contact"),
+    ("limit cycle", "an oscillation of constant amplitude while the hand holds still"),
+    ("loop time", "duration of one step of a node, including the wait for its inputs; 50 % of the steps are below p50, 99 % below p99"),
+    ("canceller", "subtracts the induced motion of the master from the command"),
 ];
 
 /// What goes by in a run, for its page.
@@ -104,20 +101,18 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
     todo(&mut page, steps);
-    page.table(facts(done, graph));
-
     let session = heard.signals.session();
     page.section("Signals");
     if session.is_empty() {
-        page.note("No sample of a master and of what its slave touches was heard together, so there is nothing to draw.");
+        page.note("Master and contact force were never sampled at the same time, so there is no figure.");
     }
     for axis in &session.axes {
         signals(&mut page, axis, &session);
     }
-    page.section("Timing and losses");
-    timing(&mut page, done, graph, heard);
-    page.section("Events");
-    events(&mut page, done, graph, heard);
+    page.section("Run");
+    page.table(facts(done, graph));
+    page.details("Timing and losses", |inside| timing(inside, done, graph, heard));
+    page.details("Events", |inside| events(inside, done, graph, heard));
     ending(&mut page, &TERMS);
     page
 }
@@ -125,11 +120,8 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
 /// What a hurried reader takes away.
 fn headline(done: &Done) -> (Tone, String) {
     let gain = done.summary.as_ref().map_or(String::new(), |s| format!(" at μλ = {}", number(s.last_loop_gain)));
-    let fault = done
-        .report
-        .as_ref()
-        .filter(|r| !matches!(r.cause, Cause::Completed))
-        .map(|r| format!(" The run did not go to its end: {}.", r.cause));
+    let fault =
+        done.report.as_ref().filter(|r| !matches!(r.cause, Cause::Completed)).map(|r| format!(" The run did not complete: {}.", r.cause));
     let fault = fault.or((done.lost > 0).then(|| format!(" {} messages were lost.", done.lost))).unwrap_or_default();
     let Some(outcome) = done.summary.as_ref().and_then(|s| s.outcome) else {
         let tone = if fault.is_empty() { Tone::Neutral } else { Tone::Bad };
@@ -137,11 +129,11 @@ fn headline(done: &Done) -> (Tone, String) {
         return (tone, format!("There is no loop whose stability could be judged{why}.{fault}"));
     };
     let (tone, text) = match outcome {
-        Outcome::Stable => (Tone::Good, format!("Stable{gain}: what oscillates in contact dies out.")),
+        Outcome::Stable => (Tone::Good, format!("Stable{gain}: oscillations in contact decay.")),
         Outcome::LimitCycle { amplitude_m, frequency_hz, unit } => (
             Tone::Warning,
             format!(
-                "Not stable{gain}: a limit cycle of ±{} at {} stays while the hand holds still.",
+                "Not stable{gain}: a limit cycle of ±{} at {} persists while the hand holds still.",
                 si(amplitude_m, unit.symbol()),
                 si(frequency_hz, "Hz")
             ),
@@ -154,7 +146,7 @@ fn headline(done: &Done) -> (Tone, String) {
                 format!("Limited{gain}: a clamp acted in {:.1} % of the contact{travel}; never called stable.", 100.0 * clamped_share),
             )
         }
-        Outcome::NotJudged { why } => (Tone::Unsure, format!("It cannot be told whether the loop is stable{gain}: {why}.")),
+        Outcome::NotJudged { why } => (Tone::Unsure, format!("It is not known whether the loop is stable{gain}: {why}.")),
     };
     (tone, format!("{text}{fault}"))
 }
@@ -202,12 +194,9 @@ fn signals(page: &mut Page, axis: &AxisSignals, session: &Session) {
     page.figure(
         plots(axis, session.period_s, several, &touching, None),
         &match touching.len() {
-            0 => "Position and force; the slave touched nothing.".to_string(),
-            1 => format!("Position and force; the slave touches for {} (leaps of less than 50 ms included), shaded.", si(share, "s")),
-            n => format!(
-                "Position and force; the slave touches {n} times, {} in all (leaps of less than 50 ms included), shaded.",
-                si(share, "s")
-            ),
+            0 => "Position and force; no contact of the slave.".to_string(),
+            1 => format!("Position and force; contact for {} (shaded; gaps below 50 ms included).", si(share, "s")),
+            n => format!("Position and force; {n} contacts, {} in total (shaded; gaps below 50 ms included).", si(share, "s")),
         },
     );
     if let Some((first, _)) = touching.first() {
@@ -258,7 +247,7 @@ fn plots(axis: &AxisSignals, period_s: f64, title: &str, touching: &[(f64, f64)]
 fn timing(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
     let Some(report) = &done.report else {
         page.text(&format!(
-            "All nodes ran in one process, in lockstep: {} steps in {}. Nothing waits for a deadline there and nothing can be lost between nodes.",
+            "All nodes ran in one process, in lockstep: {} steps in {}. There are no deadlines, and no sample can be lost between nodes.",
             done.steps,
             si(done.duration_s, "s")
         ));
@@ -281,12 +270,12 @@ fn timing(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
         ]);
     }
     let period = si(graph.period_s(), "s");
-    page.table(table.caption(&format!("Time for one step of each node, waiting for its inputs included; a step lasts {period}.")));
+    page.table(table.caption(&format!("Duration of one step of each node, including the wait for its inputs; the period is {period}.")));
     if let Some(unrecorded) = report.unrecorded.filter(|n| *n > 0) {
         page.warning(&format!("{unrecorded} messages did not reach the recorder and are not in the bag."));
     }
     for death in &report.deaths {
-        let again = if death.recovered { "; it was started again and joined the run" } else { "" };
+        let again = if death.recovered { "; it was restarted and rejoined the run" } else { "" };
         page.warning(&format!("{} {} at {}{again}.", death.node, death.how, si(death.t_s, "s")));
     }
     if graph.timing.clock == Clock::Realtime {
@@ -307,7 +296,7 @@ fn latency(page: &mut Page, graph: &Graph, heard: &Heard) {
     }
     if any {
         plot = plot.horizontal(graph.period_s(), "one step", Tone::Warning);
-        page.figure(plot, "Loop time of each node, as it told of itself during the run.");
+        page.figure(plot, "Loop time of each node, as reported during the run.");
     }
 }
 

@@ -11,42 +11,44 @@ use backdrive_why::happening::Happening;
 const UNLIKELY: f64 = 0.01;
 
 /// Where the signals alone do not say why.
-pub const NO_CAUSE: &str = "cannot be told: what there is holds no model of the loop and no excitation that measures it";
+pub const NO_CAUSE: &str = "not known: the recording contains no model of the loop and no excitation from which it can be measured";
 
 /// The page of an answer about a session, with what to do next; `tries` are the commands that try each remedy, in their order.
 pub fn page(found: &Answer, session: &Session, tries: &[Step], steps: &[Step]) -> Page {
     let name = std::path::Path::new(&found.bag).file_name().map_or(found.bag.clone(), |n| n.to_string_lossy().into_owned());
-    let mut page = Page::new(&format!("Why does it shake? {name}"));
-    page.lead(tone(found), &lead(found));
+    let mut page = Page::new(&format!("Cause of the oscillation: {name}"));
+    page.lead(tone(found), &crate::stability::spelled(&lead(found)));
+    todo(&mut page, steps);
     if let Some(beneath) = &found.beneath {
         page.text(&format!("Without that limit: {beneath}."));
     }
     if !found.reproduced && found.again.is_some() {
         page.warning(
-            "The loop of the graph, with everything that was found, does something else when it is run again than what was recorded. Something is not known, and \
-             what follows is less sure.",
+            "The re-simulation, with all differences found, does not reproduce the recording. Some cause is unknown, and the results \
+             below are less certain.",
         );
     }
-    todo(&mut page, steps);
     pictures(&mut page, found, session);
     page.section("Causes");
     causes(&mut page, found);
-    page.section("What would stop it");
-    remedies(&mut page, found, tries);
-    page.section("Where the recording is not what its graph says");
-    if found.differs.is_empty() {
-        page.text("Nowhere: every node does of what it was given what the graph says of it.");
-    }
-    found.differs.iter().for_each(|d| {
-        page.text(&format!("{d}."));
+    page.section("Details");
+    page.details("Remedies", |inside| remedies(inside, found, tries));
+    page.details("Differences between the recording and its graph", |inside| {
+        if found.differs.is_empty() {
+            inside.text("None: every node responds to its recorded inputs as the graph states.");
+        }
+        found.differs.iter().for_each(|d| {
+            inside.text(&format!("{d}."));
+        });
     });
     if !found.events.is_empty() {
-        page.section("What the nodes told");
         let mut table = Table::new(["event", "times"]);
         for (kind, count) in &found.events {
             table.push([kind.replace('_', " "), count.to_string()]);
         }
-        page.table(table);
+        page.details("Events of the nodes", |inside| {
+            inside.table(table);
+        });
     }
     if !found.notes.is_empty() {
         page.details("Notes", |inside| {
@@ -70,14 +72,17 @@ fn tone(found: &Answer) -> Tone {
 fn lead(found: &Answer) -> String {
     let mut text = format!("{}, at μλ = {}.", large(&found.happens), number(found.gain));
     if let Some(first) = found.causes.first() {
-        text += &format!(" The likeliest cause is {} (confidence {}).", first.kind.words(), percent(first.confidence));
+        text += &format!(" Most likely cause: {} (confidence {}).", first.kind.words(), percent(first.confidence));
+    }
+    if let Some(remedy) = found.remedies.first().filter(|r| r.stops && found.happening.is_trouble()) {
+        text += &format!(" First remedy: {}.", remedy.text);
     }
     text
 }
 
 fn pictures(page: &mut Page, found: &Answer, session: &Session) {
     let Some(axis) = session.axes.first() else { return };
-    page.section("The loop, recorded and run again");
+    page.section("The loop, recorded and re-simulated");
     let time = |s: &Session| (0..s.len()).map(|i| i as f64 * s.period_s).collect::<Vec<_>>();
     // A run-away is drawn as far as it stays in the device.
     let reach = axis.intent.as_ref().map_or(0.0, |x| x.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs())));
@@ -89,7 +94,7 @@ fn pictures(page: &mut Page, found: &Answer, session: &Session) {
     if let Some(again) = &found.again_signals
         && let Some(a) = again.axes.first()
     {
-        plot = plot.line("run again as it was", &time(again), &drawn(&a.master));
+        plot = plot.line("re-simulated as recorded", &time(again), &drawn(&a.master));
     }
     if let Some(remedy) = found.remedies.first().filter(|r| r.stops)
         && let Some(signals) = &remedy.signals
@@ -104,19 +109,19 @@ fn pictures(page: &mut Page, found: &Answer, session: &Session) {
     );
     page.figure(
         Figure::stacked([plot, force]),
-        "What the master did, what the loop does when it is run again with everything that was found, and with the first remedy.",
+        "The recording, the re-simulation with all differences found, and the re-simulation with the first remedy.",
     );
 }
 
 fn causes(page: &mut Page, found: &Answer) {
     if found.causes.is_empty() {
         let trouble = found.happening.is_trouble();
-        page.text(&if trouble { format!("The cause {}.", NO_CAUSE) } else { "Nothing shakes, so nothing is the cause.".to_string() });
+        page.text(&if trouble { format!("The cause {}.", NO_CAUSE) } else { "There is no oscillation, so there is no cause.".to_string() });
         return;
     }
     page.text(
-        "The loop was run again as it was, and once more without each suspect. A suspect that was seen in the recording counts more than one that the graph states; \
-         one without which the loop still shakes counts little.",
+        "The loop was re-simulated as recorded, and once without each suspect. A suspect seen in the recording has more weight than one \
+         stated by the graph. A suspect without which the loop still oscillates has little weight.",
     );
     let mut table = Table::new(["cause", "where", "confidence", "seen", "without it", "stable up to μλ, without it"]);
     for cause in found.causes.iter().filter(|c| c.confidence >= UNLIKELY) {
@@ -137,18 +142,18 @@ fn causes(page: &mut Page, found: &Answer) {
 
 fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
     if found.remedies.is_empty() {
-        page.text(if found.happening.is_trouble() { "Nothing could be tried." } else { "Nothing needs to be stopped." });
+        page.text(if found.happening.is_trouble() { "No remedy could be tried." } else { "No remedy is needed." });
         return;
     }
     let mut table = Table::new([
         "remedy",
-        "the loop then",
+        "result",
         "stops it",
-        "with other grips and more gain",
+        "other grips, higher gain",
         "force left",
         "motion left",
-        "beyond what was recorded",
-        "how it is tried",
+        "beyond the recording",
+        "options of the command",
     ]);
     let yes = |is: bool| if is { "yes" } else { "no" }.to_string();
     for (index, remedy) in found.remedies.iter().enumerate() {
@@ -160,19 +165,24 @@ fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
             percent(remedy.force_kept),
             percent(remedy.motion_kept),
             remedy.throws.as_ref().map_or_else(|| "no".to_string(), ToString::to_string),
-            tries.get(index).and_then(Step::pasted).unwrap_or_default(),
+            tries.get(index).and_then(Step::pasted).map(|command| options(&command)).unwrap_or_default(),
         ]);
     }
     page.table(table);
 }
 
+/// A command without its program, verb and bag.
+fn options(command: &str) -> String {
+    command.find(" --").map_or(command, |at| &command[at + 1..]).to_string()
+}
+
 /// The terms of the page.
 const TERMS: [(&str, &str); 7] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
-    ("canceller", "the node that predicts the motion that the reflected force makes, and takes it out of the command"),
-    ("seen", "the recording itself shows it: a node's recorded output is not what its recorded inputs make of it"),
-    ("run again", "the loop of the bag run from its models with the recorded hand, with everything that was found"),
-    ("force left", "the force that reaches the hand, against λ times the contact force with the λ of the bag"),
-    ("motion left", "how much of the hand's motion in free space the slave is told, against the master without force"),
+    ("limit cycle", "an oscillation of constant amplitude while the hand holds still"),
+    ("canceller", "the node that predicts the motion that the reflected force causes, and subtracts it from the command"),
+    ("seen", "shown by the recording itself: a node's recorded output differs from its response to the recorded inputs"),
+    ("re-simulated", "a simulation of the loop from its models with the recorded hand, with all differences found"),
+    ("force left", "the force that reaches the hand, relative to λ times the contact force with the λ of the bag"),
+    ("motion left", "the share of the hand's motion in free space that is sent to the slave, relative to the master without force"),
 ];

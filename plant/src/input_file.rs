@@ -54,7 +54,7 @@ fn check(path: &Path, kind: FileType) -> Result<()> {
     } else {
         "something else"
     };
-    Err(Error::new(ErrorKind::InvalidInput, format!("it is {what}, expected a regular file; copy what it holds into a file first")))
+    Err(Error::new(ErrorKind::InvalidInput, format!("it is {what}, expected a regular file; copy its content into a file first")))
 }
 
 fn is_handed_over(path: &Path) -> bool {

@@ -53,19 +53,19 @@ pub enum LinearError {
         frequency_hz: f64,
     },
     /// The inertia of the free bodies is not positive definite.
-    #[error("body \"{body}\" has no inertia of its own, and no inerter gives it any")]
+    #[error("body \"{body}\" has neither inertia nor an inerter")]
     NoInertia {
         /// Its name.
         body: String,
     },
     /// A frequency at which the response is infinite: 0 Hz of a body that nothing holds.
-    #[error("the response at {frequency_hz} Hz is infinite: nothing holds the device there")]
+    #[error("the response at {frequency_hz} Hz is infinite: the device is not restrained")]
     Infinite {
         /// Hz.
         frequency_hz: f64,
     },
     /// The eigenvalue iteration did not converge.
-    #[error("the eigenvalues of this model cannot be found; its numbers may be too far apart")]
+    #[error("the eigenvalues of this model cannot be found; its parameters may differ by too many orders of magnitude")]
     NotConverged,
     /// No such input or output.
     #[error("the model has no {what} number {index}")]

@@ -209,7 +209,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
             if !is_recording(source) {
                 return Err(top.error_at(
                     key,
-                    format!("\"{source}\" is no recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"),
+                    format!("\"{source}\" is not a recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"),
                 ));
             }
             exists(&top, key, source)?;
@@ -219,7 +219,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         }
     }
     if let Some(both) = held_out.iter().find(|name| fit.contains(name)) {
-        return Err(top.error_at("held_out", format!("\"{both}\" is in fit too; no fit may see what is held out")));
+        return Err(top.error_at("held_out", format!("\"{both}\" is in fit too; a held-out recording must not be fitted")));
     }
     if fit.is_empty() && held_out.is_empty() {
         return Err(top.error("names no recordings; expected fit = [\"a.csv\", ...]"));

@@ -139,7 +139,7 @@ fn wrong_files_are_refused_with_file_line_key_and_what_to_do() {
             "[bodies]\nmotor = 0".into(),
             "x.toml:2: bodies.motor: a free body without inertia; give it some, or an inerter, or prescribe it with a motion input",
         ),
-        ("[bodies]\nground = 1".into(), "x.toml:2: bodies.ground: ground always exists and has no inertia; leave it out"),
+        ("[bodies]\nground = 1".into(), "x.toml:2: bodies.ground: ground always exists and has no inertia; omit it"),
         ("[body]\nmotor = 1".into(), "x.toml:1: unknown key \"body\"; did you mean \"bodies\"?"),
         ("[elements]\n".into(), "x.toml:1: elements: expected a list of tables: write [[elements]], not [elements]"),
         (
@@ -160,7 +160,7 @@ fn wrong_files_are_refused_with_file_line_key_and_what_to_do() {
         ),
         (
             spring("kind = \"spring\"\nbetween = [\"motor\", \"port\"]\nstiffness = 1"),
-            "x.toml:7: elements[0] \"cable\" between: only a fragment has a port: its file says kind = \"fragment\"",
+            "x.toml:7: elements[0] \"cable\" between: only a fragment has a port: its file has kind = \"fragment\"",
         ),
         (
             spring("kind = \"spring\"\nbetween = [\"motor\", \"handle\"]\nstifness = 1"),
@@ -204,11 +204,11 @@ fn wrong_files_are_refused_with_file_line_key_and_what_to_do() {
     }
     assert_eq!(
         Fragment::from_toml("", "x.toml").unwrap_err().to_string(),
-        "x.toml: is the model of a device, expected a fragment (a grip or an environment): its file says kind = \"fragment\""
+        "x.toml: is the model of a device, expected a fragment (a grip or an environment): its file has kind = \"fragment\""
     );
     assert_eq!(
         Fragment::from_toml("kind = \"fragment\"\n[bodies]\nport = 1", "x.toml").unwrap_err().to_string(),
-        "x.toml:3: bodies.port: stands for the body of the device that the fragment is attached to; leave it out"
+        "x.toml:3: bodies.port: represents the body of the device to which the fragment is attached; omit it"
     );
 }
 
@@ -361,7 +361,7 @@ fn numbers_are_read_and_set_by_path() {
     assert_eq!(wrong("elements.cable.stif", &[1.0]), "unknown key \"stif\"; did you mean \"stiffness\"?");
     assert_eq!(wrong("elements.cable.stiffness", &[1.0, 2.0]), "elements.cable.stiffness takes one number, not 2");
     assert_eq!(wrong("inputs.feedback_force.delay", &[f64::NAN]), "inputs.feedback_force.delay must be a finite number, is NaN");
-    assert!(wrong("elements", &[1.0]).starts_with("\"elements\" is no path of a number; expected bodies.NAME"));
+    assert!(wrong("elements", &[1.0]).starts_with("\"elements\" is not the path of a parameter; expected bodies.NAME"));
 }
 
 #[test]

@@ -226,5 +226,5 @@ fn bodies_without_any_inertia_are_named() {
     let mut m = device("rigid-mass");
     m.bodies[0].inertia = 0.0;
     let error = LinearModel::new(&m, &Operating::small()).unwrap().modes().unwrap_err();
-    assert_eq!(error.to_string(), "body \"handle\" has no inertia of its own, and no inerter gives it any");
+    assert_eq!(error.to_string(), "body \"handle\" has neither inertia nor an inerter");
 }

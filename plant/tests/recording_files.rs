@@ -108,7 +108,7 @@ fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
     let read = |text: &str| read_text(text, Some(&["torque", "angle"]), &Columns::new(), &Piece::default());
     let told = message(read("t,torque [furlong],angle\n0,1,2\n1,2,3\n"));
     assert!(told.starts_with("x.csv:1: torque [furlong]: unknown unit \"furlong\"; known are s, ms"), "{told}");
-    assert!(told.contains("say scale for \"torque\" under [columns]"), "{told}");
+    assert!(told.contains("set scale for \"torque\" under [columns]"), "{told}");
     let told = message(read("t [mm],torque,angle\n0,1,2\n1,2,3\n"));
     assert_eq!(told, "x.csv:1: t [mm]: is in mm, a length (m), expected a time such as s or ms");
     let model = Model::from_toml(MOTOR, "motor.toml").unwrap();
@@ -116,7 +116,7 @@ fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
         [("t,torque [A],angle\n0,1,2\n1,2,3\n", "in A, a current (A)"), ("t,torque,angle [mm]\n0,1,2\n1,2,3\n", "in mm, a length (m)")]
     {
         let told = read(text).unwrap().check_units(&model).unwrap_err().to_string();
-        assert!(told.contains(unit) && told.contains("say scale under [columns]"), "{told}");
+        assert!(told.contains(unit) && told.contains("set scale under [columns]"), "{told}");
     }
     let dir = folder(&[("set.toml", "[columns]\nx = { column = 'y', unit = 'mmm' }\n"), ("x.csv", "t,y\n0,1\n1,2\n")]);
     let told = message(RecordingSet::open(dir.path()));
@@ -153,15 +153,12 @@ fn wrong_recordings_are_refused_at_their_line() {
     assert_eq!(read("t,y\n0,1\n1\n"), "x.csv:3: expected 2 cells, as the heading has, found 1");
     assert_eq!(
         read("t,y\n0,1\n2,1\n1,1\n"),
-        "x.csv:4: t: time does not rise: 1 s after 2 s; of a file with several runs, set.toml takes one with where or rows"
+        "x.csv:4: t: time does not rise: 1 s after 2 s; from a file with several runs, set.toml selects one with where or rows"
     );
     assert_eq!(read("t,y\n0,1\n0,1\n"), "x.csv:3: t: time does not rise: 0 s after 0 s");
     assert_eq!(read("t,y\n0,1\n"), "x.csv: needs at least 2 rows of data, has 1");
     assert_eq!(read("t,y,y\n0,1,1\n1,1,1\n"), "x.csv:1: y: two columns have this heading");
-    assert_eq!(
-        read("time,x\n0,1\n1,1\n"),
-        "x.csv:1: unknown column \"t\"; there is time, x ([columns] t = \"...\" says which column it is)"
-    );
+    assert_eq!(read("time,x\n0,1\n1,1\n"), "x.csv:1: unknown column \"t\"; there is time, x ([columns] t = \"...\" names the column)");
     let rule = |source: Source| vec![("y".to_string(), ColumnRule::of(source))];
     let with = |columns: &Columns| message(read_text("t,x\n0,1\n1,1\n", Some(&["y"]), columns, &Piece::default()));
     assert_eq!(with(&rule(Source::Column("xx".into()))), "x.csv:1: [columns] y: unknown column \"xx\"; did you mean \"x\"?");
@@ -279,7 +276,7 @@ files.fast = { of = "log.csv", where = { run = 2 } }
         message(RecordingSet::open(dir.path()))
     };
     assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"lag.csv\" }").contains("there is no file \"lag.csv\""));
-    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"notes.txt\" }").contains("\"notes.txt\" is no recording"));
+    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"notes.txt\" }").contains("\"notes.txt\" is not a recording"));
 }
 
 #[test]
@@ -308,11 +305,11 @@ fn wrong_sets_are_refused() {
     assert_eq!(open("model = 'm.toml'\nfit = ['a.csv']"), "set.toml:1: model: there is no file \"m.toml\"");
     assert_eq!(
         open("fit = ['a.csv']\nheld_out = ['a.csv']"),
-        "set.toml:2: held_out: \"a.csv\" is in fit too; no fit may see what is held out"
+        "set.toml:2: held_out: \"a.csv\" is in fit too; a held-out recording must not be fitted"
     );
     assert_eq!(
         open("fit = ['a.txt']"),
-        "set.toml:1: fit: \"a.txt\" is no recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"
+        "set.toml:1: fit: \"a.txt\" is not a recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"
     );
     assert_eq!(open("held_uot = ['a.csv']\nfit=['b.csv']"), "set.toml:1: unknown key \"held_uot\"; did you mean \"held_out\"?");
     assert_eq!(open("fit = ['a.csv']\ninitial = 'moving'"), "set.toml:2: initial: unknown value \"moving\"; expected one of rest, free");

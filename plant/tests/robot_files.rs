@@ -80,7 +80,7 @@ fn a_urdf_is_refused_in_a_sentence_with_its_line() {
     refused(&bare, "arm.xml:15: joint \"extension\": nothing that it moves has inertia: give link \"slider\"");
     refused(
         &with("<dynamics", "<mimic joint=\"extension\"/><dynamics"),
-        "ties this joint to joint \"extension\", which a tree cannot; take <mimic> out",
+        "ties this joint to joint \"extension\", which a tree cannot represent. Remove <mimic>",
     );
     refused(
         &with("type=\"continuous\"", "type=\"floating\""),
@@ -225,7 +225,7 @@ fn an_mjcf_is_refused_in_a_sentence_with_its_line() {
     refused(&mujoco_with("range=\"-90 90\"", "range=\"90 -90\""), "expected the lower limit first");
     refused(&mujoco_with("name=\"fore\" pos", "name=\"fore\" euler=\"0 0 1\" quat=\"1 0 0 0\" pos"), "says both quat and euler");
     refused("<mujoco><worldbody><body/></worldbody></mujoco>", "has no joint that moves");
-    refused("<mujoco><worldbody><joint/></worldbody></mujoco>", "stands in <worldbody>, which does not move");
+    refused("<mujoco><worldbody><joint/></worldbody></mujoco>", "is in <worldbody>, which does not move");
     refused(
         "<mujoco><worldbody>\n<body name='a'><joint/></body></worldbody></mujoco>",
         "arm.xml:2: joint \"a_joint\": nothing that it moves has inertia",

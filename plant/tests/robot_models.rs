@@ -163,7 +163,7 @@ fn what_is_wrong_is_said_with_its_line() {
     refused("[bodies]\na = 1\n[joint.a]\nnetwork = 'drive.toml'\n", "only a model with a [robot] has joints");
     refused(&ARM.replace("'port', 'motor'", "'port', 'motr'"), "unknown body \"motr\"; did you mean \"motor\"?");
     refused(&ARM.replace("['joint1', 'ground']", "['joint2', 'ground']"), "unknown body \"joint2\"");
-    refused(&ARM.replace("file = 'rods.urdf'", "file = 'rods.urdf'\nxml = '<robot/>'"), "says \"file\" and \"xml\"");
+    refused(&ARM.replace("file = 'rods.urdf'", "file = 'rods.urdf'\nxml = '<robot/>'"), "has both \"file\" and \"xml\"");
     refused("[robot]\nxml = '<robot name=\"x\"/>'\n", "model.toml robot.xml:1: <robot name=\"x\">: has no <link>");
     let said = Model::from_toml("[robot]\nfile = 'rods.urdf'\n", "x.toml").unwrap_err().to_string();
     assert!(said.contains("this model is not in a folder"), "{said}");

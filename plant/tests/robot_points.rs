@@ -374,14 +374,14 @@ fn what_cannot_be_a_point_is_refused_with_its_place() {
     let cases = [
         (point("link = 'rod7'"), "point.tip.link: unknown link \"rod7\""),
         (point("at = [0, 0, 0]"), "point.tip"),
-        (point("link = 'rod1'\naxis = [0, 0, 0]"), "point.tip.axis: is no direction"),
+        (point("link = 'rod1'\naxis = [0, 0, 0]"), "point.tip.axis: is not a direction"),
         (point("link = 'rod1'\naxis = [1, 0]"), "expected three numbers: a direction"),
         (point("link = 'rod1'\nat = [0.1]"), "expected three numbers, m: the point in the frame of its link"),
         (point("link = 'rod1'\nplace = 3"), "place"),
         (format!("{robot}[point.joint0]\nlink = 'rod1'\naxis = [1, 0, 0]\n"), "is called \"joint0\" already"),
         ("[point.tip]\nlink = 'rod1'\n[bodies]\na = 1.0\n".to_owned(), "only a model with a [robot] has points"),
         (on_tip("[bodies]\ntip = 0.2\n"), "is a point of the robot, which has the inertia of its link"),
-        (on_tip("[[inputs]]\nname = 'm'\nkind = 'motion'\non = 'tip'\n"), "whose place the joints tell"),
+        (on_tip("[[inputs]]\nname = 'm'\nkind = 'motion'\non = 'tip'\n"), "whose position follows from the joints"),
         (on_tip("[[inputs]]\nname = 'f'\nkind = 'force'\non = 'tip'\nback_emf = 0.1\n"), "a point of the robot has no motor"),
     ];
     for (text, with) in cases {

@@ -100,7 +100,7 @@ const ROUNDS: usize = 3;
 fn refitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, PredictError> {
     let refit = |problem: &Problem| search(problem, settings, limit, report).map_err(PredictError::input);
     let Search { mut nominal, noise_sd, .. } = refit(problem)?;
-    report("fitting each record by itself");
+    report("fitting each record alone");
     let per_record = fit_each(problem, &nominal, &noise_sd, &Budget::new(settings.work(), limit));
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &noise_sd);
@@ -125,7 +125,7 @@ fn refitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn 
             !loose.iter().any(|(i, _)| i + 1 == index)
         });
         kept.extend(loose.into_iter().map(|l| l.1));
-        report("fitting what is determined");
+        report("fitting the determined parameters");
         nominal = refit(&free)?.nominal;
         spread = Uncertainty::of(&nominal);
     }

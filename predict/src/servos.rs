@@ -64,7 +64,7 @@ impl ServoRuns {
         if stated(&problem).iter().all(Option::is_none) {
             let names: Vec<&str> = model.servos.iter().map(|s| s.joint.as_str()).collect();
             return Err(PredictError::input(format!(
-                "{}: holds no joint that {} has a [servo] of; it has {}",
+                "{}: contains no joint for which {} has a [servo]; it has {}",
                 options.drive,
                 path.display(),
                 names.join(", ")

@@ -73,7 +73,7 @@ impl Drive {
                     model.set_values_at(path, &[*value]).map_err(|e| PredictError::input(format!("{recording}: condition {path}: {e}")))?
                 }
                 Condition::Free | Condition::Shared(_) => {
-                    notes.push(format!("{recording}: {path} is free in this file; the model's own number is used"));
+                    notes.push(format!("{recording}: {path} is free in this file; the model's value is used"));
                 }
             }
         }
@@ -135,7 +135,7 @@ pub fn drives(options: &Options, model: &Model) -> Result<Vec<Drive>, PredictErr
             .collect();
     }
     let excitation: Excitation = options.drive.parse().map_err(|e| {
-        PredictError::input(format!("{e}; it is no recording either: those end in .csv or .mcap, or are a folder with a set.toml"))
+        PredictError::input(format!("{e}; it is not a recording either: those end in .csv or .mcap, or are a folder with a set.toml"))
     })?;
     let drive = [(options.input.clone(), excitation)];
     Ok(vec![Drive {
@@ -176,7 +176,7 @@ fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Res
     if wanted.is_empty() {
         let topics: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();
         return Err(PredictError::input(format!(
-            "{}: say in [columns] of a set.toml which topics hold {}; the bag has {}",
+            "{}: state in [columns] of a set.toml which topics hold {}; the bag has {}",
             path.display(),
             signals_of(model).join(", "),
             topics.join(", ")
@@ -225,7 +225,7 @@ fn predict(model: &Model, drive: &Recording, options: &Options) -> Result<Record
     columns.extend(model.outputs.iter().map(|o| o.name.clone()).zip(outputs));
     let diverged = columns.iter().any(|(_, samples)| samples.iter().any(|x| !x.is_finite()));
     if diverged {
-        return Err(PredictError::input(format!("model \"{}\": its motion grows beyond all bounds on {}", model.name, drive.name)));
+        return Err(PredictError::input(format!("model \"{}\": its motion diverges on {}", model.name, drive.name)));
     }
     Recording::new(&drive.name, drive.t.clone(), columns).map_err(PredictError::input)
 }

@@ -89,7 +89,7 @@ impl Case {
     pub fn kind(&self) -> Option<&'static str> {
         let name = self.concealed.first()?.split(' ').next()?;
         let kind = KINDS.iter().find(|(_, names)| names.contains(&name));
-        Some(kind.map_or("other physics", |(kind, _)| kind))
+        Some(kind.map_or("another effect", |(kind, _)| kind))
     }
 
     /// Whether the recordings show what is concealed: the error of the nominal model on held-out data, with any refit, is at least [`SHOWS`] standard
@@ -112,7 +112,7 @@ impl Case {
         let gains: Vec<String> =
             here.map(|g| format!("{} {}{:.2}", g.canceller, if g.whole_range { "above " } else { "" }, g.stable_to)).collect();
         let [given, refitted, diagnosed] = self.held_out.map(percent);
-        let floors = self.refit_floors.map_or_else(String::new, |floors| format!(" ({floors:.1} noise floors)"));
+        let floors = self.refit_floors.map_or_else(String::new, |floors| format!(" ({floors:.1} sd of the noise)"));
         let mut text = format!(
             "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted{floors}, {diagnosed} diagnosed",
             list(&self.concealed),
@@ -130,7 +130,7 @@ impl Case {
         }
         if !self.live.is_empty() {
             let agree = self.live.iter().filter(|run| run.agrees()).count();
-            text += &format!("\n  live graph  {agree} of {} runs about those edges did what they say", self.live.len());
+            text += &format!("\n  live graph  {agree} of {} runs near those limits agree with them", self.live.len());
         }
         text
     }

@@ -23,7 +23,7 @@ pub(super) fn ours(backdrive: &Path, folder: &Path, name: &str, arguments: &[&dy
     match status.code() {
         Some(0 | 1 | 7) => Ok(said),
         _ => {
-            let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("its output says why");
+            let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("see its output");
             Err(ProveError::input(format!("{name} ended with {status}: {why} ({})", log.display())))
         }
     }

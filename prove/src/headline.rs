@@ -92,7 +92,8 @@ impl Headline {
         let mut all = Vec::new();
         if let Some(worst) = self.worse.first() {
             all.push(format!(
-                "A canceller of the diagnosis is worse than none in {} of {} comparisons: the worst is \"{}\" with {}, stable to {} where none gives {}.",
+                "A canceller of the diagnosis is worse than none in {} of {} comparisons: the worst is \"{}\" with {}, stable up to {}; \
+                    without a canceller {}.",
                 self.worse.len(),
                 self.compared,
                 worst.canceller,
@@ -104,7 +105,8 @@ impl Headline {
         if let Some(first) = self.otherwise.first() {
             let should = if first.run.below_edge { "stable" } else { "not stable" };
             all.push(format!(
-                "{} of {} live runs did not do what the stability limits say: with canceller \"{}\" at μλ = {} it should have been {should} and was {}.",
+                "{} of {} live runs contradict the stability limits: with canceller \"{}\" at μλ = {} it should have been {should} and \
+                    was {}.",
                 self.otherwise.len(),
                 self.live,
                 first.run.canceller,
@@ -113,10 +115,10 @@ impl Headline {
             ));
         }
         if !self.misnamed.is_empty() {
-            all.push(format!("What was concealed was not named as it is in {}.", self.misnamed.join(", ")));
+            all.push(format!("The concealed effects were not named correctly in {}.", self.misnamed.join(", ")));
         }
         if self.compared == 0 {
-            all.push("What the diagnosis is worth in the loop was not tried.".to_string());
+            all.push("The effect of the diagnosis on the loop was not measured.".to_string());
         } else if self.worse.is_empty() {
             all.push(format!("No canceller of the diagnosis is worse than none ({} comparisons).", self.compared));
         }
@@ -189,6 +191,6 @@ mod tests {
         // Nothing was tried: that is said.
         let mut untried = named.clone();
         (untried.gains, untried.live) = (Vec::new(), Vec::new());
-        assert!(of(&untried).sentences().iter().any(|s| s.contains("was not tried")));
+        assert!(of(&untried).sentences().iter().any(|s| s.contains("was not measured")));
     }
 }

@@ -130,7 +130,8 @@ fn master(graph: &Graph, node: &Node, has: usize, ask: Ask) -> Result<Vec<Box<dy
         (NodeKind::Master, Settings::Master(files)) => files.model.as_ref().map(|m| m.axes.clone()),
         _ => None,
     };
-    let axes = axes.ok_or_else(|| format!("node \"{}\" is no master with a model: its axes and their limits are not known", node.name))?;
+    let axes =
+        axes.ok_or_else(|| format!("node \"{}\" is not a master with a model: its axes and their limits are not known", node.name))?;
     if has != axes.len() {
         return Err(format!("the hidden plant has {has} axes and the model of \"{}\" {}", node.name, axes.len()));
     }

@@ -96,7 +96,8 @@ pub(crate) fn about(
         let said = ours(backdrive, folder, &name, &[&"run", &path, &"--json", &"--overwrite"])?;
         let json = said.lines().find_map(|line| serde_json::from_str::<Value>(line).ok());
         let outcome = json.and_then(|v| v["outcome"].as_str().map(str::to_string));
-        let outcome = outcome.ok_or_else(|| ProveError::input(format!("{}: the run does not say what the loop did", path.display())))?;
+        let outcome =
+            outcome.ok_or_else(|| ProveError::input(format!("{}: the run does not report the motion of the loop", path.display())))?;
         runs.push(LiveRun { canceller: canceller.name, gain, below_edge, outcome });
     }
     Ok(runs)

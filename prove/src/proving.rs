@@ -47,8 +47,8 @@ pub fn prove(options: &Options, folder: &Path, drawn: &Draw, watch: &dyn Watch) 
         read(&options.session)?.parse().map_err(|e| ProveError::input(format!("{}: {e}", options.session.display())))?;
     let hidden = hidden_plant(options, folder, &template)?;
     let digest = draw(options, &hidden, drawn)?;
-    let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
-    let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
+    let hand = if drawn.shows_hand { "" } else { "; the hand is not measured" };
+    let masked = if drawn.refitted { "; the nominal parameters were refitted" } else { "" };
     watch.sealed(&format!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display()))?;
 
     // From here to the verdict only the hidden plant's process opens the truth.
@@ -59,7 +59,7 @@ pub fn prove(options: &Options, folder: &Path, drawn: &Draw, watch: &dyn Watch) 
         busy(watch, &at(folder, "recording the session"), || {
             ours(&options.backdrive, folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])
         })?;
-        busy(watch, &at(folder, "handing the bags over"), || hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth_hz))?;
+        busy(watch, &at(folder, "copying the bags"), || hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth_hz))?;
         Ok::<PathBuf, ProveError>(session)
     };
     let mut nominal = Nominal { model: hidden.model.clone(), grip: hidden.grip.clone() };
@@ -78,7 +78,7 @@ pub fn prove(options: &Options, folder: &Path, drawn: &Draw, watch: &dyn Watch) 
     busy(watch, &at(folder, "diagnosing"), || ours(&options.backdrive, folder, "diagnose", &arguments))?;
     let path = found.join(VERDICT_FILE);
     let verdict: Verdict =
-        serde_json::from_str(&read(&path)?).map_err(|e| ProveError::input(format!("{}: is no verdict: {e}", path.display())))?;
+        serde_json::from_str(&read(&path)?).map_err(|e| ProveError::input(format!("{}: is not a verdict: {e}", path.display())))?;
 
     let (cancellers, share) = match options.gains {
         false => (Vec::new(), None),
@@ -95,7 +95,7 @@ fn hidden_plant(options: &Options, folder: &Path, template: &DocumentMut) -> Res
     let sealed = folder.join("sealed");
     if sealed.exists() {
         return Err(ProveError::input(format!(
-            "{}: is there already; a truth is sealed once, so name another folder with --out",
+            "{}: exists already; a truth is sealed only once, so name another folder with --out",
             sealed.display()
         )));
     }
@@ -141,7 +141,8 @@ fn cancellers(
     cancellers.push(Canceller::fixed("chosen", (chosen.share > 0.0).then_some(scaled), None));
     let models: Vec<PathBuf> = std::iter::once(diagnosed).chain(rivals).collect();
     let try_all = || estimating(ESTIMATED, &models, &task, watch.stop());
-    let estimated = if is_explained { busy(watch, &at(folder, "trying the estimated hand on every explanation"), try_all)? } else { None };
+    let estimated =
+        if is_explained { busy(watch, &at(folder, "trying the estimated hand with every explanation"), try_all)? } else { None };
     cancellers.push(estimated.unwrap_or_else(|| Canceller::fixed(ESTIMATED, None, None)));
     Ok((cancellers, Some(chosen.share)))
 }
@@ -156,7 +157,7 @@ fn open_truth(hidden: &Hidden, digest: &str) -> Result<Truth, ProveError> {
     let bytes =
         backdrive_plant::input_file::read(&hidden.truth).map_err(|e| ProveError::input(format!("{}: {e}", hidden.truth.display())))?;
     if hash(&bytes) != digest {
-        return Err(ProveError::input(format!("{}: is not what was sealed", hidden.truth.display())));
+        return Err(ProveError::input(format!("{}: differs from what was sealed", hidden.truth.display())));
     }
     Truth::from_json(&bytes).map_err(ProveError::input)
 }

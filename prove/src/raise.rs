@@ -73,7 +73,7 @@ pub fn raise(
             }
             if hand == Hand::Changing && canceller.estimates_hand {
                 let settle = || recovery(the_loop, canceller, RECOVERS_AT * edge.at_least, stop);
-                raised.recovery_s = busy(watch, &at(folder, "looking how soon it settles after a change of the grip"), settle)?;
+                raised.recovery_s = busy(watch, &at(folder, "measuring the settling time after a change of the grip"), settle)?;
             }
             let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
             raised.gains.push(Gain { canceller: canceller.name, hand, stable_to: edge.at_least, because: edge.reason, whole_range });

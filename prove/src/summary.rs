@@ -77,7 +77,7 @@ impl Summary {
     /// A few lines for a person.
     pub fn text(&self) -> String {
         let mut text = format!("{}; false alarms {}", self.all, self.false_alarms);
-        text += &format!("\nof effects {SHOWS} noise floors and more from the refitted nominal model: {}", self.showing);
+        text += &format!("\nof visible effects (at least {SHOWS} sd of the noise after a refit of the nominal model): {}", self.showing);
         if self.live.of > 0 {
             text += &format!("\nthe live graph agreed in {} runs", self.live);
         }

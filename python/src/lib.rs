@@ -35,7 +35,7 @@ fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> P
         // There is no listener any more where the call was interrupted.
         let _ = done.send(call(&arguments, &theirs));
     })?;
-    let gone = || PyRuntimeError::new_err("the work ended with a fault of backdrive's own; what it said of it stands on standard error");
+    let gone = || PyRuntimeError::new_err("internal error of backdrive; see standard error");
     loop {
         match py.detach(|| heard(&result, LOOK)) {
             Ok(Called { code, result, notes, error }) => return Ok((code, result, notes, error)),

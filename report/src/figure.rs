@@ -51,7 +51,7 @@ impl Figure {
             out += &format!("<p class=\"remark\">{}</p>\n", escape(&remark));
         }
         out += &format!(
-            "<noscript>\n<p>This figure is drawn by a script in the page. Without scripts, from where to where its curves go:</p>\n{}</noscript>\n",
+            "<noscript>\n<p>This figure is drawn by a script in the page. Without scripts, the ranges of its curves:</p>\n{}</noscript>\n",
             numbers(&cells).html()
         );
         out

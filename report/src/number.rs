@@ -17,7 +17,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// A value with three significant digits and its unit with an SI prefix: `si(0.00123, "m")` is `1.23 mm`. A unit that takes no prefix
-/// (none, %, dB, °, kg, powers such as m², 1/s) keeps its number; `–` for NaN.
+/// (none, %, dB, °, kg, powers such as m², 1/s) keeps its number, and so does one with an unusual prefix: `0.82 Hz`, `13700 rad/s`. `–` for NaN.
 pub fn si(value: f64, unit: &str) -> String {
     if let Some(word) = not_finite(value) {
         return if value.is_nan() { word } else { join(&word, "", unit) };
@@ -26,13 +26,11 @@ pub fn si(value: f64, unit: &str) -> String {
         return join(&number(value), "", unit);
     }
     let (digits, exponent) = three_digits(value);
-    let Some(&(power, prefix)) = PREFIXES.iter().find(|p| p.0 == exponent.div_euclid(3) * 3) else {
-        return join(&number(value), "", unit);
-    };
-    if power > 0 && first_unit(unit) == "s" {
-        return join(&number(value), "", unit); // nobody says kiloseconds
+    let power = exponent.div_euclid(3) * 3;
+    match PREFIXES.iter().find(|p| p.0 == power && is_usual(power, unit)) {
+        Some(&(power, prefix)) => join(&fixed(digits, exponent - power), prefix, unit),
+        None => join(&number(value), "", unit),
     }
-    join(&fixed(digits, exponent - power), prefix, unit)
 }
 
 /// A share as a percentage with three significant digits: `percent(0.1234)` is `12.3 %`; `–` for NaN.
@@ -58,8 +56,8 @@ pub fn axis_scale(largest: f64, unit: &str) -> (i32, Option<&'static str>) {
     if power == 0 || unit == "dB" || unit == "°" || unit == "%" {
         return (0, None);
     }
-    if power > 0 && first_unit(unit) == "s" {
-        return (0, None);
+    if takes_prefix(unit) && !is_usual(power, unit) {
+        return if (-2..5).contains(&exponent) { (0, None) } else { (power, None) };
     }
     match PREFIXES.iter().find(|p| p.0 == power && takes_prefix(unit)) {
         Some(&(_, prefix)) => (power, Some(prefix)),
@@ -83,6 +81,15 @@ fn first_unit(unit: &str) -> &str {
 /// Whether a prefix before this unit means what the reader thinks: not before `m²` (mm² is not a thousandth), `kg`, `1/s`.
 fn takes_prefix(unit: &str) -> bool {
     matches!(first_unit(unit), "m" | "s" | "N" | "Nm" | "J" | "W" | "Hz" | "V" | "A" | "g" | "Pa" | "rad" | "Ω" | "F" | "H" | "B")
+}
+
+/// Whether engineers use the prefix of a power with a unit: not ks, km, krad or mHz.
+fn is_usual(power: i32, unit: &str) -> bool {
+    match first_unit(unit) {
+        "s" | "m" | "rad" => power <= 0,
+        "Hz" => power >= 0,
+        _ => true,
+    }
 }
 
 fn not_finite(value: f64) -> Option<String> {
@@ -142,6 +149,10 @@ mod tests {
             (39_500.0, "N/m", "39.5 kN/m"),
             (2.5e-7, "J", "250 nJ"),
             (1200.0, "s", "1200 s"),
+            (0.818, "Hz", "0.818 Hz"),
+            (1500.0, "Hz", "1.50 kHz"),
+            (13_700.0, "rad/s", "13700 rad/s"),
+            (0.0137, "rad", "13.7 mrad"),
             (0.02, "s", "20.0 ms"),
             (0.01076, "kg", "0.0108 kg"),
             (3e-6, "m²", "3.00e-6 m²"),
@@ -173,7 +184,10 @@ mod tests {
         assert_eq!(axis_scale(5000.0, "Hz"), (0, None));
         assert_eq!(axis_scale(50_000.0, "N/m"), (3, Some("k")));
         assert_eq!(axis_scale(3e-5, ""), (-6, None));
-        assert_eq!(axis_scale(3e9, "s"), (0, None));
+        assert_eq!(axis_scale(3e4, "s"), (0, None));
+        assert_eq!(axis_scale(3e9, "s"), (9, None));
+        assert_eq!(axis_scale(0.5, "Hz"), (0, None));
+        assert_eq!(axis_scale(13_700.0, "rad/s"), (0, None));
         assert_eq!(power_of_ten(-12), "10⁻¹²");
     }
 }

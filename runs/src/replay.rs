@@ -60,10 +60,7 @@ impl Replay {
             let topic = graph.topic_of(operator, port).name;
             let missing = reader.completeness().and_then(|c| c.topics.iter().find(|t| t.topic == topic)).map_or(0, |t| t.lost);
             if missing > 0 {
-                watch.note(&format!(
-                    "warning: {}: {missing} messages of {topic} are missing; what they would change rests where it was",
-                    path.display()
-                ));
+                watch.note(&format!("warning: {}: {missing} messages of {topic} are missing; the last values are held", path.display()));
             }
             let _reading = watch.begins(&format!("reading {}", path.display()));
             rows_of(&reader, &topic, graph.nodes[operator].axes, read)
@@ -119,7 +116,7 @@ fn rows_of(reader: &Reader, topic: &str, axes: usize, read: &dyn Fn(&Sample, usi
         }
     }
     let Some(last) = samples.iter().map(|(step, _)| *step).max() else {
-        return Err(RunError::input(format!("{}: holds no message on {topic}", path.display())));
+        return Err(RunError::input(format!("{}: contains no message on {topic}", path.display())));
     };
     // A step whose sample was lost keeps the value before it.
     let mut rows: Rows = vec![vec![[0.0, 0.0]; last as usize + 1]; axes];

@@ -40,7 +40,7 @@ fn of_bag(path: &Path, changes: &Overrides) -> Result<Graph, RunError> {
     let mut graph = graph_of(&reader, changes)?;
     if !runs_from_its_bag(&graph) {
         return Err(RunError::input(format!(
-            "{}: its graph has programs of your own or several hosts, which a bag does not hold; run its graph file",
+            "{}: its graph has external programs or several hosts, which a bag does not contain; run its graph file",
             path.display()
         )));
     }

@@ -45,10 +45,10 @@ impl Way {
     pub fn of(graph: &Graph, transport: Option<Transport>, meeting: Meeting) -> Result<Way, RunError> {
         let wire = match transport {
             Some(Transport::Inproc) if meeting.host.is_some() => {
-                return Err(RunError::input("--transport inproc is for one host; leave --host out"));
+                return Err(RunError::input("--transport inproc is for one host; omit --host"));
             }
             Some(Transport::Inproc) if meeting.secret.is_some() => {
-                return Err(RunError::input("--secret is what several hosts share; leave it out without --host"));
+                return Err(RunError::input("--secret is for several hosts; omit it without --host"));
             }
             Some(Transport::Inproc) => return Ok(Way::Here),
             Some(Transport::Iceoryx2) => Some(Wire::Iceoryx2),
@@ -98,8 +98,8 @@ fn too_many_poll(graph: &Graph, host: Option<&str>, watch: &dyn Watch) {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     if graph.polls && processes > processors {
         watch.note(&format!(
-            "warning: wait = \"poll\" keeps a processor busy for each process, and {processes} processes share {processors}: the loop will be slow; \
-             take it away, or let nodes share a process (together)"
+            "warning: wait = \"poll\" keeps a processor busy for each process, and {processes} processes share {processors}: the loop \
+             will be slow; remove it, or let nodes share a process (together)"
         ));
     }
 }
@@ -125,7 +125,7 @@ fn run_processes(graph: &Graph, place: &Place, watch: &dyn Watch) -> Result<Done
     let warn = |e: SummaryError| watch.note(&format!("warning: {e}"));
     let mut summary = summary.and_then(|summary| summary.map_err(warn).ok());
     if report.bag.as_deref().is_some_and(|bag| !bag.exists()) {
-        unreadable = Some("is not there any more".to_string());
+        unreadable = Some("no longer exists".to_string());
     }
     let lost = report.lost + report.unrecorded.unwrap_or(0);
     if let Some(summary) = &mut summary {
@@ -182,7 +182,7 @@ fn in_this_process(graph: &Graph, all_or_nothing: bool, watch: &dyn Watch, hear:
     };
     if let Some(node) = graph.nodes.iter().find(|n| n.command.is_some()) {
         return Err(RunError::input(format!(
-            "node \"{}\" is a program of its own, which one process cannot hold; run it with --transport iceoryx2",
+            "node \"{}\" is an external program, which cannot run in the same process; run it with --transport iceoryx2",
             node.name
         )));
     }

@@ -23,18 +23,18 @@ The hidden plant: draws what a device hides and seals it, or is that device.
 backdrive-sealed draw --model FILE [--grip FILE] --seed N --out FILE [--effects N] [--nonlinear] [--masked PERCENT]
                       [--grip-differs PERCENT] [--rate HZ]
     Draws a truth from a seed, writes it, and prints its SHA-256 as sha256sum does. A file that is there is not replaced.
-    --effects       how many, 0 to 3 (1)
-    --nonlinear     only effects that no linear model can imitate
-    --masked        per cent, 0 to 50, by which nominal numbers are wrong at most (15)
-    --grip-differs  per cent, 0 to 50, by which the true grip differs from the nominal one at most (20)
+    --effects       number of effects, 0 to 3 (1)
+    --nonlinear     only effects that no linear model can reproduce
+    --masked        largest error of a nominal parameter, per cent, 0 to 50 (15)
+    --grip-differs  largest error of the nominal grip, per cent, 0 to 50 (20)
     --rate          samples of the graph per second (5000)
 
 backdrive-sealed run --model FILE [--grip FILE] --truth FILE [--number N] [--firmness FACTOR]
                      [--regrips T:FACTOR,...] [--rate HZ]
     Is the device that a truth describes, over standard input and output: documentation of the library, `process`.
-    --number        which run it is: every one has sensor noise of its own (0)
-    --firmness      how firm the hand grips in this run: factor on the true grip (1)
-    --regrips       how it changes that in the run: from T seconds on by FACTOR, 2:1.5,4:0.7
+    --number        number of the run, the seed of its sensor noise (0)
+    --firmness      factor on the true grip in this run (1)
+    --regrips       changes of the grip in this run: from T seconds on by FACTOR, 2:1.5,4:0.7
 ";
 
 /// What stands behind the verb: `--name value`, and names that stand alone.
@@ -142,7 +142,7 @@ fn put(text: &str) -> Result<(), Failure> {
 }
 
 fn misused(what: impl std::fmt::Display) -> Failure {
-    Failure(format!("{what}; backdrive-sealed --help says what there is"), 2)
+    Failure(format!("{what}; see backdrive-sealed --help"), 2)
 }
 
 fn wrong(error: impl std::fmt::Display) -> Failure {

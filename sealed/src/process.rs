@@ -87,7 +87,7 @@ pub enum RemoteError {
         error: io::Error,
     },
     /// Its first output was something else. Why it ended stands in its own error output.
-    #[error("the hidden plant did not begin as it should but with \"{0}\"; its error output says why")]
+    #[error("the hidden plant started with \"{0}\" instead of the expected line; see its error output")]
     Greeting(String),
     /// It ended or a pipe broke.
     #[error("the hidden plant does not answer any more: {0}")]

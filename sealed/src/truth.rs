@@ -77,7 +77,7 @@ pub enum TruthError {
         given: String,
     },
     /// It names a number, an output or a factor that the device does not have or cannot take.
-    #[error("the truth says {path} = {value}, which the nominal model does not have or cannot take")]
+    #[error("the truth has {path} = {value}, which the nominal model does not have or does not accept")]
     Number {
         /// The path.
         path: String,

@@ -79,7 +79,7 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
             Use::Still(why) => remarks.push(Remark {
                 what: "constant".to_string(),
                 place: joint.name.clone(),
-                message: format!("nothing is said of it: {why}"),
+                message: format!("it is not diagnosed: {why}"),
                 weight: Weight::Caution,
             }),
         }
@@ -90,7 +90,7 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
         return Err(ServoError::wrong(at, first));
     }
     if problem.joints.iter().all(|j| j.fit.is_empty()) {
-        return Err(ServoError::wrong("set.toml: fit", "names no recording: name some to fit"));
+        return Err(ServoError::wrong("set.toml: fit", "names no recording: name some under fit"));
     }
     let records: Vec<(Vec<&Record>, f64)> = used
         .iter()
@@ -322,10 +322,12 @@ fn scale(problem: &Problem, answers: &[Answer]) -> String {
         .map(|a| problem.joints[a.joint].name.as_str())
         .collect();
     match known.is_empty() {
-        true => "no torque scale is known: forces are angles, in parts of the servo's proportional gain (rad); a stated gain or a known payload would give N m".to_string(),
+        true => "no torque scale is known: forces are given as angles, divided by the servo's proportional gain (rad); a stated gain or a \
+            known payload would give N m"
+            .to_string(),
         false => format!(
-            "N m rest on the masses of the robot file and the droop under them (at {}), and are no better than those masses; all other forces are angles, in parts of \
-             the servo's proportional gain (rad)",
+            "torques in N m are scaled by the masses of the robot file and the droop at {}, and are as accurate as those masses. Other \
+             forces are angles, divided by the proportional gain (rad)",
             known.join(", ")
         ),
     }

@@ -33,9 +33,7 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return Ok(Use::Still("its command is constant in all recordings: record motions of this joint".to_string()));
     }
     if !all.iter().any(|r| moves(&r.position)) {
-        return Ok(Use::Still(
-            "it is commanded and never moves: look whether its torque is on and which column is its position".to_string(),
-        ));
+        return Ok(Use::Still("it is commanded and never moves: check that its torque is on and which column is its position".to_string()));
     }
     let moving: Vec<&Record> = commanded.iter().copied().filter(|r| moves(&r.position)).collect();
     for record in &moving {
@@ -46,7 +44,10 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
             };
             return wrong(
                 record,
-                format!("{what}: the dataset logs states as actions, so nothing of the servo can be learnt from it; record what was sent"),
+                format!(
+                    "{what}: the dataset logs states as actions, so the servo cannot be identified from it; record the commands that \
+                    were sent"
+                ),
             );
         }
     }
@@ -57,7 +58,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return wrong(
             longest,
             format!(
-                "varies {ratio:.0} times as much as the position: it is in degrees; say command = {{ column = \"...\", unit = \"deg\" }} in [joints.{name}]"
+                "varies {ratio:.0} times as much as the position: it is in degrees; write command = {{ column = \"...\", unit = \"deg\" \
+                    }} in [joints.{name}]"
             ),
         );
     }
@@ -66,7 +68,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return Err(ServoError::wrong(
             position,
             format!(
-                "varies {:.0} times as much as the command: it is in degrees; say position = {{ column = \"...\", unit = \"deg\" }} in [joints.{name}]",
+                "varies {:.0} times as much as the command: it is in degrees; write position = {{ column = \"...\", unit = \"deg\" }} in \
+                    [joints.{name}]",
                 1.0 / ratio
             ),
         ));
@@ -78,7 +81,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return wrong(
             longest,
             format!(
-                "is a goal velocity: its integral follows the position ({:.0} % of it) and it does not; name the column of the goal position",
+                "is a goal velocity: its integral follows the position ({:.0} %), and the signal itself does not; name the column of the \
+                    goal position",
                 100.0 * by_integral
             ),
         );
@@ -87,7 +91,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return wrong(
             longest,
             format!(
-                "comes {:.2} s after the position that answers it: its times are wrong; shift them with t in [columns], or record with one clock",
+                "lags the position that responds to it by {:.2} s: its times are wrong; shift them with t in [columns], or record with \
+                    one clock",
                 -lag
             ),
         );
@@ -96,7 +101,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return wrong(
             longest,
             format!(
-                "is answered after {lag:.2} s, which no servo takes: command and position have clocks that differ; record both with one clock"
+                "leads the position by {lag:.2} s, more than any servo needs: command and position have different clocks; record both \
+                    with one clock"
             ),
         );
     }
@@ -104,7 +110,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
         return wrong(
             longest,
             format!(
-                "explains {:.0} % of the position at any lag up to half the recording: it is late by more than that, or another joint's; look at the column and the clock",
+                "explains {:.0} % of the position at any lag up to half the recording: it lags by more than that, or belongs to another \
+                    joint; check the column and the clock",
                 100.0 * explained.max(0.0)
             ),
         );

@@ -40,7 +40,7 @@ pub const ALL: [Physics; 14] = [
     physics("gravity", "droop under the weight of the links", &[Number::Gravity], &[], &["payload", "gain"]),
     physics(
         "payload",
-        "droop under a weight that the robot file does not state",
+        "droop under a weight that the robot file does not contain",
         &[Number::MomentCos, Number::MomentSin],
         &[],
         &["gravity", "gain"],
@@ -49,8 +49,8 @@ pub const ALL: [Physics; 14] = [
     physics("saturation", "a limit of the torque", &[Number::Limit], &[], &["speed_limit", "acceleration_limit"]),
     physics("speed_limit", "a limit of the speed", &[Number::Speed], &[], &["saturation", "acceleration_limit"]),
     physics("acceleration_limit", "a limit of the acceleration", &[Number::Acceleration], &[], &["saturation", "speed_limit"]),
-    physics("integral", "an integral part of the servo", &[Number::Integral], &[], &[]),
-    physics("lead", "a derivative part that acts on the command", &[Number::Lead], &[], &[]),
+    physics("integral", "an integral term of the servo", &[Number::Integral], &[], &[]),
+    physics("lead", "a derivative term on the command", &[Number::Lead], &[], &[]),
     physics("quadratic_drag", "drag that grows with the square of the speed", &[Number::QuadraticDamping], &[], &[]),
 ];
 

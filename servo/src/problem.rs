@@ -104,7 +104,7 @@ impl Problem {
         if model.arm.is_some() && !all_there {
             let missing: Vec<&str> = coordinates.iter().filter(|c| columns.iter().all(|j| j.name != **c)).map(String::as_str).collect();
             notes.push(format!(
-                "no position of {} was named, so the torque of gravity is not known, and droop is fitted as a sine of each joint's own angle",
+                "no position of {} is named, so the torque of gravity is unknown, and droop is fitted as a sine of each joint's own angle",
                 missing.join(", ")
             ));
         }
@@ -155,7 +155,7 @@ fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
         if let Some(without) = set.joints.iter().find(|j| !j.has_command) {
             return Err(ServoError::wrong(
                 file,
-                format!("[joints.{}] has no command, and others have: add command = \"HEADING\", or leave the joint out", without.name),
+                format!("[joints.{}] has no command, but others have: add command = \"HEADING\", or leave the joint out", without.name),
             ));
         }
         return Ok(set.joints.clone());
@@ -190,7 +190,7 @@ fn read_file(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Result<
         recording.units.iter().find(|(name, unit)| names.contains(&name.as_str()) && !matches!(unit.kind, Kind::Angle | Kind::Length));
     if let Some((signal, unit)) = odd {
         let what = if matches!(unit.kind, Kind::AngularSpeed | Kind::Speed) {
-            "a goal velocity is no position command"
+            "a goal velocity is not a position command"
         } else {
             "expected an angle or a length"
         };

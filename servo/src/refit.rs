@@ -52,7 +52,7 @@ pub fn refit(problem: &Problem) -> Result<Fitted, ServoError> {
     if used.is_empty() {
         return Err(ServoError::wrong(
             "set.toml: joints",
-            "no joint of the model's [servo] moves in these recordings; name them as the model does",
+            "no joint of the model's [servo] moves in these recordings; use the joint names of the model",
         ));
     }
     let joints: Vec<Refitted> = used

@@ -23,7 +23,7 @@ pub fn free_runs(problem: &Problem, numbers: &[Option<Numbers>], held_out: bool,
         .iter()
         .map(|joint| {
             let all = if held_out { &joint.held_out } else { &joint.fit };
-            all.get(index).ok_or_else(|| ServoError::wrong(joint.name.clone(), "has not as many recordings as the other joints"))
+            all.get(index).ok_or_else(|| ServoError::wrong(joint.name.clone(), "has fewer recordings than the other joints"))
         })
         .collect::<Result<_, _>>()?;
     let mut positions: Vec<Vec<f64>> = records.iter().map(|r| beside_command(r)).collect();

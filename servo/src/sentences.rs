@@ -25,13 +25,13 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> S
     };
     let joints: Vec<String> = servo.joints.iter().filter_map(|j| of(&j.joint)).collect();
     match word {
-        Word::NothingMissing => "delay, second order and offset explain how every joint answers its commands".to_string(),
+        Word::NothingMissing => "delay, second order and offset explain the response of every joint to its commands".to_string(),
         Word::Unexplained => {
-            "delay, second order and offset do not explain how the joints answer, and no known physics explains more".to_string()
+            "delay, second order and offset do not explain the response of the joints, and no known effect explains more".to_string()
         }
         _ if joints.is_empty() => {
-            "something beyond delay, second order and offset shows, and which physics it is these recordings do not tell".to_string()
+            "an effect beyond delay, second order and offset is present, but these recordings do not show which one".to_string()
         }
-        _ => format!("beside delay, second order and offset, {}", joints.join("; ")),
+        _ => format!("in addition to delay, second order and offset: {}", joints.join("; ")),
     }
 }

@@ -11,16 +11,19 @@ const APART: f64 = 2.5;
 pub fn shared(found: &Found) -> Vec<SharedCause> {
     let mut out = vec![cause(
         &["damper", "derivative_gain", "back_emf"],
-        "damping is the sum of viscous friction, the servo's derivative part and the motor's back-EMF: positions alone do not divide it",
-        "move the joint by hand with the torque off: only viscous friction is left there",
+        "damping is the sum of viscous friction, the servo's derivative term and the motor's back-EMF; positions alone do not separate \
+            them",
+        "move the joint by hand with the torque off: then only viscous friction acts",
     )];
     let delay = found.best.fit.numbers[Number::Delay];
     let spread = found.best.folds.iter().map(|n| (n[Number::Delay] - delay).abs()).fold(0.0, f64::max);
     if delay > 3.0 * spread.max(1e-3) {
         out.push(cause(
             &["delay", "series_compliance"],
-            "what is told as delay holds transport, the age of the position when it is logged, and all that is quicker than the recording, a soft gear among it",
-            "chirp up to the fastest that the joint follows: a delay turns the phase in proportion to the frequency and leaves the amplitude, a soft gear has a peak",
+            "the reported delay contains transport, the age of the logged position, and dynamics faster than the recording, such as a \
+                soft gear",
+            "command a chirp up to the highest frequency that the joint follows: a delay changes only the phase, in proportion to \
+                frequency; a soft gear has a resonance peak",
         ));
     }
     for claim in &found.claims {
@@ -45,19 +48,20 @@ fn told(one: &str, other: &str) -> (&'static str, &'static str) {
     let is = |a: &str, b: &str| (one, other) == (a, b) || (one, other) == (b, a);
     if is("coulomb", "dead_band") {
         return (
-            "dry friction and a dead band leave the same band of angles in which the joint stays",
-            "approach one angle under two loads, or at two speeds: friction keeps its band at any speed, a dead band lets a moving joint come nearer",
+            "dry friction and a dead band cause the same range of angles at which the joint stays",
+            "approach one angle under two loads or at two speeds: the range of friction does not depend on speed, that of a dead band \
+                shrinks for a moving joint",
         );
     }
     if is("coulomb", "backlash") || is("dead_band", "backlash") {
         return (
             "play, dry friction and a dead band all delay the joint after a reversal by a fixed angle",
-            "reverse under a steady load: it closes the play, and leaves friction as it is",
+            "reverse under a steady load: it closes the play and does not change the friction",
         );
     }
     if is("coulomb", "load_friction") {
         return (
-            "friction that grows with the load and friction that does not are one where the load hardly changes",
+            "friction that grows with the load cannot be separated from friction that does not, where the load hardly changes",
             "repeat one motion with a known payload",
         );
     }
@@ -69,12 +73,17 @@ fn told(one: &str, other: &str) -> (&'static str, &'static str) {
     }
     if is("saturation", "speed_limit") || is("saturation", "acceleration_limit") || is("speed_limit", "acceleration_limit") {
         return (
-            "limits of torque, speed and acceleration all flatten large steps",
-            "steps of 0.1, 0.3 and 1 rad: a limit of speed gives ramps of one slope, one of acceleration ramps whose slope grows with the step, one of torque depends on the load",
+            "limits of torque, speed and acceleration all slow down large steps",
+            "command steps of 0.1, 0.3 and 1 rad. A speed limit gives ramps of one slope, an acceleration limit gives slopes that grow \
+                with the step, a torque limit depends on the load",
         );
     }
     if is("coulomb", "stribeck") {
-        return ("friction that is larger at rest shows at slow reversals only", "ramps at four speeds from a hundredth of the fastest on");
+        return (
+            "friction that is larger at rest shows only at slow reversals",
+            "command ramps at four speeds, from a hundredth of the \
+            highest speed",
+        );
     }
-    ("both predict the recordings that were left out alike", "larger and smaller motions at several speeds")
+    ("both predict the held-out recordings equally well", "larger and smaller motions at several speeds")
 }

@@ -125,7 +125,7 @@ fn what_is_no_command_is_refused_in_one_sentence() {
     });
     assert!(velocity.contains("is a goal velocity"), "{velocity}");
     let late = refused(|r| r.command.rotate_right(150));
-    assert!(late.contains("after the position that answers it") || late.contains("late by more than that"), "{late}");
+    assert!(late.contains("lags the position") || late.contains("lags by more than that"), "{late}");
     for message in [equal, constant, still, degrees, velocity, late] {
         assert!(!message.contains('\n') && message.len() < 300, "{message}");
     }

@@ -21,10 +21,11 @@ pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
             if first == second { format!("{second}: is given twice") } else { format!("{second}: is the same recording as {first}") };
         if held != first_held {
             return Err(SetError::new(format!(
-                "{which}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another recording, or give it once"
+                "{which}, once to be fitted and once held out. A recording used in a fit cannot test it: hold out another recording, or \
+                    name it once"
             )));
         }
-        notes.push(format!("{which}: its samples count twice, so that intervals are too narrow"));
+        notes.push(format!("{which}: its samples would count twice, and intervals would be too narrow"));
     }
     Ok(notes)
 }
@@ -37,8 +38,8 @@ pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
     for held in &problem.held_out {
         if let Some(fitted) = problem.fit.iter().find(|fitted| same(fitted, held)) {
             return Err(SetError::new(format!(
-                "{}: holds the same samples as {}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another \
-                 recording, or give it once",
+                "{}: holds the same samples as {}, once to be fitted and once held out. A recording used in a fit cannot test it: hold \
+                 out another recording, or name it once",
                 held.name, fitted.name
             )));
         }
@@ -88,19 +89,19 @@ pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], ha
         let takes: Vec<&str> = model.inputs.iter().map(|i| i.name.as_str()).collect();
         let prefix = name.strip_suffix("hand").map_or("", |p| p.trim_end_matches(['.', '_']));
         let hint = match has_grip {
-            true => format!("the grip that was given is another one than \"{prefix}\""),
+            true => format!("the given grip is not \"{prefix}\""),
             false => format!("did you mean --grip {prefix}.toml (the grip that held the device), or a model that holds the hand?"),
         };
         return Err(SetError::new(format!(
-            "{file}: {name}, a motion of the hand, is in the recordings and nothing takes it: the model's inputs are {}; {hint} \
-             --ignore-signal {name}, or ignore = [\"{name}\"] in set.toml, goes on without it",
+            "{file}: {name}, a motion of the hand, is in the recordings, but the model has no input for it. Its inputs are {}; {hint} \
+             --ignore-signal {name}, or ignore = [\"{name}\"] in set.toml, continues without it",
             takes.join(", ")
         )));
     }
     let names: Vec<&str> = unused.iter().map(|(name, _)| name.as_str()).collect();
     Ok(match names.as_slice() {
         [] => None,
-        names => Some(format!("recorded and not used, for the model has no such input or output: {}", names.join(", "))),
+        names => Some(format!("recorded, but not used, because the model has no such input or output: {}", names.join(", "))),
     })
 }
 

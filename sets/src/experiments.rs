@@ -151,8 +151,8 @@ impl Set {
     pub fn add(&mut self, experiment: &Experiment, device: &Device) -> Result<(), String> {
         let file = format!("{}.mcap", experiment.name);
         let conditions = differences(&self.model, &device.model).filter(|_| self.columns == device.columns);
-        let conditions =
-            conditions.ok_or("records a device of other bodies or elements than the experiments before it; give it a step of its own")?;
+        let conditions = conditions
+            .ok_or("records a device with other bodies or elements than the experiments before it; put it into a separate step")?;
         if !conditions.is_empty() {
             self.conditions.push((file.clone(), conditions));
         }
@@ -164,7 +164,7 @@ impl Set {
     /// The texts of its set file and of its model.
     pub fn texts(&self) -> [(&'static str, String); 2] {
         let quoted = |names: &[String]| names.iter().map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", ");
-        let mut text = String::from("# Recordings of one device; `held_out` are kept from every fit.\n");
+        let mut text = String::from("# Recordings of one device; no fit uses those under `held_out`.\n");
         let _ = writeln!(text, "model    = \"model.toml\"");
         let _ = writeln!(text, "fit      = [{}]", quoted(&self.fit));
         let _ = writeln!(text, "held_out = [{}]", quoted(&self.held_out));

@@ -35,7 +35,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     if model.is_none() && set.model.is_none() {
         let first = paths.first().map_or(String::new(), |p| p.display().to_string());
         return Err(SetError::new(format!(
-            "{first}: no model is named; give one with --model MODEL.toml, or a set.toml that says model = \"...\""
+            "{first}: no model is named; give one with --model MODEL.toml, or a set.toml with model = \"...\""
         )));
     }
     hold_out(&mut set, told, &mut notes);
@@ -77,7 +77,7 @@ pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), SetError> {
                 return Err(SetError::new(format!("{}: there is no such file or folder", one.display())));
             }
             if let Some(command) = import_command(one) {
-                return Err(SetError::new(format!("{}: is no set of recordings yet: `{command}` makes it one", one.display())));
+                return Err(SetError::new(format!("{}: is not a set of recordings yet: `{command}` makes it one", one.display())));
             }
             let told = !one.is_dir() || one.join("set.toml").exists();
             Ok((RecordingSet::open(one)?, told))
@@ -92,16 +92,15 @@ pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
         match set.fit.len() {
             // Where a set.toml states what is fitted, that is not changed.
             _ if told => notes.push(
-                "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
+                "no recording is held out, so the improvement is shown on the fitted ones; name some under held_out in set.toml"
                     .to_string(),
             ),
-            0 | 1 => notes.push(
-                "one recording: it is fitted and judged alike; a second one, held out, would show whether the result holds".to_string(),
-            ),
+            0 | 1 => notes
+                .push("only one recording: it is used for the fit and the test; a second one, held out, would test the result".to_string()),
             _ => {
                 if let Some(last) = set.fit.pop() {
                     notes.push(format!(
-                        "{} is held out: no fit sees it",
+                        "{} is held out: no fit uses it",
                         Path::new(&last).file_name().map_or(last.clone(), |n| n.to_string_lossy().into_owned())
                     ));
                     set.held_out.push(last);
@@ -116,8 +115,8 @@ fn held(model: &Path, grip: &Path) -> Result<String, SetError> {
     let (free, grip_name) = (Model::load(model)?, grip.display());
     let (held, _) = free.held_by(&Fragment::load(grip)?);
     if held == free {
-        let why = if free.axes.is_empty() { "has no [[axes]]" } else { "holds the user's hand already" };
-        return Err(SetError::new(format!("{}: {why}, so {grip_name} cannot be put on it; leave --grip out", model.display())));
+        let why = if free.axes.is_empty() { "has no [[axes]]" } else { "contains the user's hand already" };
+        return Err(SetError::new(format!("{}: {why}, so {grip_name} cannot be put on it; omit --grip", model.display())));
     }
     Ok(held.to_toml())
 }
@@ -130,7 +129,7 @@ fn unfinished(path: &Path) -> Option<String> {
     }
     let reader = Reader::open(path).ok()?;
     let name = path.display();
-    let recover = format!("what it holds is used; make a clean copy: {}", recover_command(path));
+    let recover = format!("its remaining content is used; make a clean copy: {}", recover_command(path));
     if let Some(damage) = reader.damage().first() {
         return Some(format!("{name} is damaged ({damage}): {recover}"));
     }
@@ -140,8 +139,8 @@ fn unfinished(path: &Path) -> Option<String> {
     // A bag of its own, whatever its header states: by its messages.
     let faults = Account::of(&reader).ok()?.faults;
     let (first, more) = (faults.first()?, faults.len() - 1);
-    let others = if more > 0 { format!(", and {more} more: `backdrive bag info --check {name}` says all") } else { String::new() };
-    Some(format!("{name} is not whole: {first}{others}"))
+    let others = if more > 0 { format!(", and {more} more: see `backdrive bag info --check {name}`") } else { String::new() };
+    Some(format!("{name} is incomplete: {first}{others}"))
 }
 
 /// What to know of a bag that is longer than what is read of it.
@@ -153,7 +152,7 @@ fn begun(set: &RecordingSet, file: &str) -> Option<String> {
     let longest = backdrive_bags::info(&path).ok()?.topics.iter().map(|topic| topic.messages).max().unwrap_or(0);
     (longest > MOST_OF_A_BAG as u64).then(|| {
         let of = format!("{}: of {longest} samples of a signal the first {MOST_OF_A_BAG} are read", path.display());
-        format!("{of}; rows = [FROM, TO] in set.toml takes another piece of it")
+        format!("{of}; rows = [FROM, TO] in set.toml selects another part of it")
     })
 }
 
@@ -166,7 +165,7 @@ pub fn not_onto(out: &Path, files: &[PathBuf], overwrite: bool) -> Result<(), Se
     let name = out.display();
     match (is_recording(file), overwrite) {
         (true, _) => Err(SetError::new(format!("{name}: is a recording that is read; write to another file"))),
-        (false, false) => Err(SetError::new(format!("{name}: is read here and would be lost; write to another file, or say --overwrite"))),
+        (false, false) => Err(SetError::new(format!("{name}: is an input and would be lost; write to another file, or use --overwrite"))),
         (false, true) => Ok(()),
     }
 }
@@ -181,7 +180,7 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, SetError> {
         if !is_recording(path) {
             let what = match import_command(path) {
                 Some(command) => format!("is read as a bag: `{command}` makes it one"),
-                None => "is no recording (.csv or .mcap); give one set, or recordings only".to_owned(),
+                None => "is not a recording (.csv or .mcap); name one set, or recordings only".to_owned(),
             };
             return Err(SetError::new(format!("{}: {what}", path.display())));
         }
@@ -198,10 +197,10 @@ fn told_failure(error: &ProblemError, model: Option<&Path>, set: &RecordingSet) 
     let hint = match error {
         ProblemError::Recording(RecordingError::NoSignal { .. }) => {
             let model = model.or(set.model.as_deref()).map_or(String::new(), |m| format!(" of {}", m.display()));
-            format!("; every input{model} needs a column of its name, or say under [columns] of set.toml which column it is")
+            format!("; every input{model} needs a column of its name, or name the column under [columns] of set.toml")
         }
         ProblemError::Recording(RecordingError::NotRising { .. }) => {
-            "; sort the rows, or cut the file where its clock starts anew".to_string()
+            "; sort the rows, or split the file where its clock restarts".to_string()
         }
         ProblemError::Recording(RecordingError::NotFinite { .. }) => {
             "; leave the row out, or name the rows that count in set.toml".to_string()

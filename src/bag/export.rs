@@ -49,7 +49,7 @@ fn whole(bags: &[Reader], topics: Option<&[String]>) -> Result<u8, Failure> {
         if account.empty_steps > 0 && !faults.is_empty() {
             let of = account.last_step.map_or(0, |last| last + 1);
             output::note(format_args!(
-                "warning: {path}: {} of {of} rows are missing, for no topic has a message of their steps",
+                "warning: {path}: {} of {of} rows are missing, because no topic has a message for these steps",
                 account.empty_steps
             ));
         }
@@ -70,7 +70,7 @@ fn whole(bags: &[Reader], topics: Option<&[String]>) -> Result<u8, Failure> {
 fn apart(out: &Path, bag: &Path) -> Result<(), Failure> {
     match (out.canonicalize(), bag.canonicalize()) {
         (Ok(there), Ok(read)) if read.starts_with(&there) => {
-            Err(Failure::input(format!("{}: would replace {}, which is read; name another place", out.display(), bag.display())))
+            Err(Failure::input(format!("{}: would replace {}, which is an input; name another place", out.display(), bag.display())))
         }
         _ => Ok(()),
     }
@@ -89,11 +89,11 @@ fn ending(out: &Path) -> Option<ExportTo> {
 fn dataset(asked: &BagExport) -> Result<u8, Failure> {
     let out = &asked.out;
     if !asked.topic.is_empty() {
-        return Err(Failure { code: 2, message: "--topic is for tables; of a bag's joints a dataset has all".to_owned() });
+        return Err(Failure { code: 2, message: "--topic is for tables; a dataset contains all joints of the bag".to_owned() });
     }
     let is_free = !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none());
     if !is_free && !is_lerobot(out) {
-        return Err(Failure::input(format!("{}: exists and is no LeRobot dataset, so it is not replaced; name another", out.display())));
+        return Err(Failure::input(format!("{}: exists and is not a LeRobot dataset, so it is not replaced; name another", out.display())));
     }
     if !is_free && !asked.overwrite {
         return Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", out.display())));
@@ -101,7 +101,7 @@ fn dataset(asked: &BagExport) -> Result<u8, Failure> {
     asked.bags.iter().try_for_each(|bag| apart(out, bag))?;
     let contract = asked.contract.as_deref().map(Contract::read).transpose()?.unwrap_or_default();
     let readers = asked.bags.iter().map(|bag| Reader::open(bag).map_err(Failure::input)).collect::<Result<Vec<_>, _>>()?;
-    let task = asked.task.clone().unwrap_or_else(|| "not told".to_owned());
+    let task = asked.task.clone().unwrap_or_else(|| "not given".to_owned());
     let failed = |e: std::io::Error| Failure::write(out, e);
     let above = out.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(above).map_err(failed)?;

@@ -50,7 +50,7 @@ fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {
 fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
     let report = busy(&format!("recovering {}", damaged.display()), || recover(damaged, bag, overwrite)).map_err(Failure::bag)?;
     if !report.is_lossy() {
-        output::line(format_args!("{}: had ended cleanly and is whole; copied", damaged.display()))?;
+        output::line(format_args!("{}: was closed cleanly and is complete; copied", damaged.display()))?;
     }
     let of = report.expected.map_or(String::new(), |all| format!(" of {all}"));
     let until = report.last_step.map_or(String::new(), |step| format!(", up to step {step}"));
@@ -66,12 +66,12 @@ fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
     }
     if report.unconfirmed > 0 {
         output::note(format_args!(
-            "warning: {} of the saved messages stand in a damaged chunk: index and type agree, but no checksum vouches for their values",
+            "warning: {} of the saved messages are in a damaged chunk: index and type agree, but no checksum confirms their values",
             report.unconfirmed
         ));
     }
     if !report.was_clean {
-        output::note(format_args!("warning: {}: had not been closed; what its end held is not known", damaged.display()));
+        output::note(format_args!("warning: {}: was not closed; its end is lost", damaged.display()));
     }
     Ok(if report.is_lossy() { code::LOST_DATA } else { 0 })
 }

@@ -8,20 +8,20 @@ pub const HELP: &str = "Example:
   backdrive run launch/contact.toml --clock realtime &
   backdrive bridge --domain 7
 
-Exit codes: 0 carried until the run ended, 2 usage, 3 no run is alive or several are, 4 messages were lost, 5 the network does not let it, or a stranger sends on the run's topics.";
+Exit codes: 0 ran until the run ended, 2 usage, 3 no run is alive or several are, 4 messages were lost, 5 prevented by the network, or a foreign sender on the run's topics.";
 
 /// `backdrive bridge`
 #[derive(Debug, Args)]
 pub struct Bridge {
-    /// The beginning of the run's name; not needed while one run is alive.
+    /// The beginning of the run's name; not needed if only one run is active.
     pub run: Option<String>,
-    /// Also take what the graph's nodes on other hosts send, for a run with --host; without it the bridge only publishes.
+    /// Also receive the topics of the graph's nodes on other hosts, for a run with --host. Without this the bridge only publishes.
     #[arg(long)]
     pub both_ways: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub network: Network,
-    /// Print what crossed as JSON.
+    /// Print the message counts as JSON.
     #[arg(long)]
     pub json: bool,
 }

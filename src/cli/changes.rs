@@ -19,33 +19,33 @@ pub struct SwappedParts {
     /// Model of the slave.
     #[arg(long, value_name = "FILE")]
     pub slave: Option<PathBuf>,
-    /// What the slave touches; `none` for nothing.
+    /// The slave's environment; `none` for no contact.
     #[arg(long, value_name = "FILE|none")]
     pub environment: Option<PathBuf>,
     /// Model that predicts the induced motion; `none` to cancel nothing, `master` for the model and the grip of the graph's master (a file of
-    /// that name: `./master`). Without this it stays the graph's, whatever the master is.
+    /// that name: `./master`). Without this the graph's model is used, independent of the master.
     #[arg(long, value_name = "FILE|none|master")]
     pub canceller: Option<PathBuf>,
-    /// Grip that the canceller assumes; `none` for no hand, `master` for the grip of the graph's master. Without this it stays the graph's,
-    /// whatever the real grip is.
+    /// Grip that the canceller assumes; `none` for no hand, `master` for the grip of the graph's master. Without this the graph's grip is used,
+    /// independent of the real grip.
     #[arg(long, value_name = "FILE|none|master")]
     pub canceller_grip: Option<PathBuf>,
-    /// Corner of a high-pass on the canceller's estimate; 0 for none.
+    /// Corner frequency of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
-    /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md. Over several
-    /// axes an estimate needs --edge-without.
-    #[arg(long, value_parser = choices([("as-modelled", "As its grip says", Hand::AsModelled), ("estimated", "Estimated", Hand::Estimated)]))]
+    /// Whether the canceller uses a fixed grip model, or estimates the grip stiffness during the run (docs/canceller.md). For several
+    /// axes the estimate needs --edge-without.
+    #[arg(long, value_parser = choices([("as-modelled", "As its grip file states", Hand::AsModelled), ("estimated", "Estimated", Hand::Estimated)]))]
     pub hand: Option<Hand>,
-    /// Gain product from which on the loop shakes without a canceller, whichever hand holds (`backdrive stability` says it): a canceller that estimates the hand
-    /// then cancels no more than the gain needs.
+    /// Stability limit mu*lambda without a canceller, for all grips (`backdrive stability` computes it). A canceller that estimates the hand
+    /// then cancels only as much as the gain requires.
     #[arg(long, value_name = "MU_LAMBDA", value_parser = positive, allow_negative_numbers = true)]
     pub edge_without: Option<f64>,
-    /// Whether sensors round and are noisy as the model files say.
-    #[arg(long, value_parser = choices([("as-modelled", "As the model files say", Sensors::AsModelled), ("ideal", "Exact", Sensors::Ideal)]))]
+    /// Whether sensors have the quantisation and noise of the model files.
+    #[arg(long, value_parser = choices([("as-modelled", "As the model files state", Sensors::AsModelled), ("ideal", "Exact", Sensors::Ideal)]))]
     pub sensors: Option<Sensors>,
-    /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
-    #[arg(long, value_parser = choices([("enforced", "As the model files say", Limits::Enforced), ("ignored", "None act", Limits::Ignored)]))]
+    /// Whether the device's limits of force, rate and speed act; `ignored` simulates stronger motors.
+    #[arg(long, value_parser = choices([("enforced", "As the model files state", Limits::Enforced), ("ignored", "None act", Limits::Ignored)]))]
     pub limits: Option<Limits>,
 }
 
@@ -111,7 +111,7 @@ pub struct Changes {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub parts: SwappedParts,
-    /// Law between master and slave: the one of the graph's coupling, or of a coupling that takes the place of its scaling; see
+    /// Coupling law between master and slave. It replaces the law of the graph's coupling, or its scaling; see
     /// docs/couplings.md.
     #[arg(long, value_name = "LAW", value_parser = law())]
     pub coupling: Option<String>,
@@ -121,12 +121,12 @@ pub struct Changes {
     /// Force scale from slave to master.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub lambda: Option<f64>,
-    /// Add a small recorded multisine to the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`; from it the
-    /// running loop tells its margin in contact, on the status line (`margin 2.4x at 71 Hz`) and on /scaling/margin.
+    /// Add a small recorded multisine to the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`. From it the
+    /// running loop estimates its margin in contact, shown on the status line (`margin 2.4x at 71 Hz`) and on /scaling/margin.
     #[arg(long, value_name = "EXCITATION", num_args = 0..=1, default_missing_value = DEFAULT_DITHER)]
     pub dither: Option<String>,
-    /// Watch the loop and back the force gain off when an oscillation grows or stays, when force and master run away together,
-    /// or, with a dither, when the margin is below 1.25x; it stays down until new gains are asked for.
+    /// Supervise the loop: reduce the force gain when an oscillation grows or persists, when force and master diverge together,
+    /// or, with a dither, when the margin is below 1.25x. The gain stays reduced until new gains are set.
     #[arg(long)]
     pub guard: bool,
     /// Length of the run.
@@ -135,7 +135,7 @@ pub struct Changes {
     /// Steps per second, up to 10000.
     #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[arg(long)]
     pub seed: Option<u64>,
     /// The bag to record.
@@ -145,12 +145,12 @@ pub struct Changes {
     /// one that the graph file names gets a number: NAME-2.mcap. A bag that another run is writing is never replaced.
     #[arg(long)]
     pub overwrite: bool,
-    /// Let the bag say on which machine and from which folders it was made. Without this it holds neither; in a graph file:
+    /// Store the machine name and the folders of the run in the bag. Without this it contains neither. In a graph file:
     /// record_origin = true.
     #[arg(long)]
     pub record_origin: bool,
-    /// Let nodes wait for their inputs by looking all the time in place of sleeping: shorter ways, for machines with a processor to
-    /// spare for each process. In a graph file: wait = "poll".
+    /// Let nodes poll for their inputs instead of sleeping: lower latency, for machines with a free processor
+    /// for each process. In a graph file: wait = "poll".
     #[arg(long)]
     pub poll: bool,
 }

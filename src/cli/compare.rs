@@ -10,35 +10,35 @@ pub const HELP: &str = "Examples:
   backdrive compare launch/coupling.toml --html out/compare.html
   backdrive compare contact.mcap --laws canceller,wave --delays 0,50 --jitter none --loss none --grips 1
 
-Each number of --loss and --grips is tried at the delay --at; --jitter at its own mean. The numbers of the table are told at the gain of the
-graph, or of --lambda; the edge is the loop gain mu*lambda at which the loop stops being stable.
+Each value of --loss and --grips is used at the delay --at; --jitter at its own mean. The values of the table are for the gain of the
+graph, or of --lambda. The stability limit is the loop gain mu*lambda above which the loop is not stable.
 
-Exit codes: 0 compared, 2 usage, 3 a file is wrong, 5 the page cannot be written, 130 interrupted: what was done is shown.";
+Exit codes: 0 compared, 2 usage, 3 a file is wrong, 5 the page cannot be written, 130 interrupted: the results so far are shown.";
 
 /// `backdrive compare`
 #[derive(Debug, Args)]
 pub struct Compare {
-    /// A graph file with an operator, or the bag of a run, whose hand is then played.
+    /// A graph file with an operator, or the bag of a run, whose recorded hand is used.
     pub session: PathBuf,
-    /// What is compared; `canceller` is the law direct behind a canceller, which knows the master where the graph's subtracts nothing.
+    /// Laws to compare. `canceller` is the law direct with a canceller; if the graph's canceller subtracts nothing, it uses the exact master model.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = rival())]
     pub laws: Vec<String>,
     /// Delays of the link, ms each way.
     #[arg(long, value_name = "MS", value_delimiter = ',', value_parser = delay, default_values_t = [0.0, 20.0, 50.0, 100.0, 200.0])]
     pub delays: Vec<f64>,
-    /// Delays that vary: mean and largest deviation, ms each way; `none` for none.
+    /// Delays with jitter: mean and largest deviation, ms each way; `none` for none.
     #[arg(long, value_name = "MEAN:DEVIATION", value_delimiter = ',', value_parser = jitter, default_value = "120:40")]
     pub jitter: Vec<Jitter>,
-    /// Shares of the packets that are lost each way, 0 to 1; `none` for none.
+    /// Shares of lost packets each way, 0 to 1; `none` for none.
     #[arg(long, value_name = "SHARE", value_delimiter = ',', value_parser = loss, default_value = "0.05,0.3")]
     pub loss: Vec<Loss>,
-    /// Factors on stiffness and damping of the grip beside the grip as it is.
+    /// Further factors on stiffness and damping of the grip, in addition to 1.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 1.3])]
     pub grips: Vec<f64>,
-    /// Delay at which loss and grips are tried, ms each way.
+    /// Delay for the comparison of loss and grips, ms each way.
     #[arg(long, value_name = "MS", value_parser = delay, default_value_t = 20.0)]
     pub at: f64,
-    /// Force scale of the comparison; the session's own if not given.
+    /// Force scale of the comparison; without this that of the session.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub lambda: Option<f64>,
     /// Write the report as one HTML file.

@@ -16,10 +16,10 @@ pub const HELP: &str = "Examples:
   backdrive diagnose studies/dfki_double_pendulum/set-arm.toml --out out/arm      (a model with [robot]: logs of every joint, docs/arms.md)
   backdrive diagnose episodes/ --model arm.toml --out out/servo      (commands and positions without torque, docs/servo.md)
 
-Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
+Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes the results so far.
 
-Exit codes: 0 nothing is missing (numbers may be off), 1 something is missing, unexplained or ambiguous, 2 usage,
-3 a recording or the model is wrong, 5 a file cannot be written, 7 it cannot be told, 130 interrupted.";
+Exit codes: 0 no effect is missing (parameters may be wrong), 1 an effect is missing, unexplained or ambiguous, 2 usage,
+3 a recording or the model is wrong, 5 a file cannot be written, 7 not known, 130 interrupted.";
 
 /// `backdrive diagnose`
 #[derive(Debug, Args)]
@@ -30,37 +30,37 @@ pub struct Diagnose {
     /// Folder for verdict.json, model.diagnosed.toml and report.html; made if it is not there.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// The nominal model; without this the set's own.
+    /// The nominal model; without this the one that the set names.
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// The grip that holds the nominal model, where it holds no hand itself; `none` for no hand.
+    /// The grip that holds the nominal model, if the model contains no hand; `none` for no hand.
     #[arg(long, value_name = "FILE|none")]
     pub grip: Option<PathBuf>,
-    /// A recorded signal that is not used: an input that has no place in the model, such as a hand that was at rest, or an output that is not
+    /// A recorded signal to ignore: an input that the model does not have, such as a hand at rest, or an output that is not
     /// compared; may be given several times. In set.toml: ignore = ["NAME"].
     #[arg(long, value_name = "NAME")]
     pub ignore_signal: Vec<String>,
-    /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
+    /// An effect to exclude, together with all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
-    /// How many physics may be missing at once, at most; more take more time. Without this 3, of an arm 8
-    /// beside constant, dry and viscous friction and armature.
+    /// Largest number of missing effects; more take more time. Without this 3, for an arm 8
+    /// in addition to constant torque, dry and viscous friction and armature.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     pub effects: Option<u8>,
-    /// How much to search, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends on this alone, and is the same
-    /// on every machine. Of an arm everything is tried whatever this says.
+    /// Search effort, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends only on this and is the same
+    /// on every machine. For an arm it has no effect: everything is tried.
     #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
     pub effort: Option<f64>,
-    /// A limit on the clock; without this 600 s. Where it cuts the search off, the verdict may depend on the machine, and says so. Not for an arm.
+    /// Time limit, s; without this 600 s. If it ends the search, the verdict may depend on the machine and reports that. Not for an arm.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub patience: Option<f64>,
-    /// Print what the search tried, what it cost and why it lost.
+    /// Print all candidates of the search, their cost and why they were rejected.
     #[arg(long, conflicts_with = "json")]
     pub explain: bool,
     /// Print the verdict as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Where the report goes; without this report.html in the folder of --out.
+    /// File for the report; without this report.html in the folder of --out.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Write no report.
@@ -80,5 +80,5 @@ fn physics(name: &str) -> Result<String, String> {
     let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
     let more = |names: Vec<&'static str>| names.into_iter().filter(|n| !known.contains(n)).collect::<Vec<_>>().join(", ");
     let (arms, servos) = (more(of_arms().collect()), more(of_servos().collect()));
-    Err(format!("no such physics; there are {}; of arms also {arms}; of position servos also {servos}", known.join(", ")))
+    Err(format!("no such effect; there are {}; for arms also {arms}; for position servos also {servos}", known.join(", ")))
 }

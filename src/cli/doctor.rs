@@ -7,7 +7,7 @@ use clap::Args;
 pub const HELP: &str = "Example:
   backdrive doctor --interface eth0
 
-Exit codes: 0 runs work here, 2 usage, 3 no such interface, 5 something is bad.";
+Exit codes: 0 runs work here, 2 usage, 3 no such interface, 5 a check failed.";
 
 /// `backdrive doctor`
 #[derive(Debug, Args)]

@@ -12,10 +12,10 @@ pub const HELP: &str = "Examples:
   backdrive export arm.toml --to urdf --on set/ --out arm.urdf
   backdrive export plant/models/impulse-engine.toml --to feedforward --language python
 
-What the target cannot hold is listed on standard error (with --out on standard output), each with what stands in its place and, with --on, the
-error on the held-out recordings with it and without.
+Parts that the target format cannot represent are listed on standard error (with --out on standard output), each with its replacement and,
+with --on, the error on held-out recordings with and without it.
 
-Exit codes: 0 exported whole, 1 exported without what is listed, 2 usage, 3 the model or a recording is wrong, or there is nothing to export,
+Exit codes: 0 exported completely, 1 exported without the listed parts, 2 usage, 3 the model or a recording is wrong, or there is nothing to export,
 5 a file cannot be written.";
 
 /// `backdrive export`
@@ -23,7 +23,7 @@ Exit codes: 0 exported whole, 1 exported without what is listed, 2 usage, 3 the 
 pub struct Export {
     /// The model file: a network of one axis, or a model with a [robot].
     pub model: PathBuf,
-    /// For what.
+    /// The target format.
     #[arg(long, value_parser = choices([
         (Target::Mjcf.word(), "MuJoCo 4.0", Target::Mjcf),
         (Target::Urdf.word(), "Joints of a robot: dynamics and limits", Target::Urdf),
@@ -31,32 +31,32 @@ pub struct Export {
         (Target::Feedforward.word(), "Friction as a function of position, velocity and load, for a controller", Target::Feedforward),
     ]))]
     pub to: Target,
-    /// Of a feed-forward: what it is written in.
+    /// For a feed-forward: the programming language.
     #[arg(long, default_value = "c", value_parser = choices([
         ("c", "C99", Language::C),
         ("python", "Python 3", Language::Python),
         ("yaml", "Numbers and equations", Language::Yaml),
     ]))]
     pub language: Language,
-    /// Of a feed-forward: width w of the smooth sign tanh(v/w), m/s or rad/s; without this 1 mm/s or 10 mrad/s, and less where friction falls within less.
+    /// For a feed-forward: width w of the smooth sign tanh(v/w), m/s or rad/s. Without this 1 mm/s or 10 mrad/s, or less if friction falls faster.
     #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
     pub width: Option<f64>,
-    /// Of an MJCF: its time step, s; without this one that suits the model.
+    /// For an MJCF: its time step, s; without this a step that suits the model.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Recordings (a set, a folder, or files) on which the error is worked out that leaving something out makes: on those held out, or else on all.
+    /// Recordings (a set, a folder, or files) to compute the error that omitted parts cause; held-out ones if there are any.
     #[arg(long, value_name = "SET", num_args = 1..)]
     pub on: Vec<PathBuf>,
-    /// A recorded input that may have no place in the model; may be given several times.
+    /// A recorded input that the model may lack; may be given several times.
     #[arg(long, value_name = "NAME", requires = "on")]
     pub ignore_signal: Vec<String>,
-    /// Where it goes; without this to standard output.
+    /// Output file; without this standard output.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Replace a file that exists.
     #[arg(long)]
     pub overwrite: bool,
-    /// Print what was exported and what was left out as JSON.
+    /// Print what was exported and omitted as JSON.
     #[arg(long)]
     pub json: bool,
 }

@@ -9,7 +9,7 @@ pub const HELP: &str = "Examples:
   backdrive fit model.toml set/ --out model.fitted.toml
   backdrive fit model.toml sweep.csv steps.csv --json
 
-Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's; 2 usage; 3 a recording or the model is wrong;
+Exit codes: 0 fitted, 1 the records disagree: the model structure is wrong; 2 usage; 3 a recording or the model is wrong;
 5 the model cannot be written; 130 interrupted.";
 
 /// `backdrive fit`
@@ -20,24 +20,24 @@ pub struct Fit {
     /// A folder with set.toml, a set.toml, a folder of recordings, or recordings (CSV or MCAP).
     #[arg(required = true, value_name = "SET")]
     pub set: Vec<PathBuf>,
-    /// The grip that holds the model, where it holds no hand itself; `none` for no hand.
+    /// The grip that holds the model, if the model contains no hand; `none` for no hand.
     #[arg(long, value_name = "FILE|none")]
     pub grip: Option<PathBuf>,
-    /// A recorded input that may have no place in the model, such as a hand that was at rest; may be given several times. In set.toml:
+    /// A recorded input that the model may lack, such as a hand at rest; may be given several times. In set.toml:
     /// ignore = ["NAME"].
     #[arg(long, value_name = "NAME")]
     pub ignore_signal: Vec<String>,
-    /// Write the refitted model, with what was given and the intervals in comments. Parameters that the recordings do not determine keep
+    /// Write the refitted model, with nominal values and intervals in comments. Parameters that the recordings do not determine keep
     /// their nominal values.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Let --out take the place of the model that is read.
+    /// Allow --out to replace the input model.
     #[arg(long)]
     pub overwrite: bool,
-    /// How much to compute at most, as a multiple of the default.
+    /// Largest computation effort, as a multiple of the default.
     #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.0, allow_negative_numbers = true)]
     pub effort: f64,
-    /// A limit on the clock. What it cuts off may differ from machine to machine.
+    /// Time limit, s. A result that it cuts short may depend on the machine.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience(), allow_negative_numbers = true)]
     pub patience: f64,
     /// Print the result as JSON.

@@ -13,14 +13,15 @@ pub const HELP: &str = "Examples:
   backdrive init log --columns 'angle [deg],speed [deg/s],torque [N m]' --rate 1000 --motion rotation --drive torque --position angle --yes
   backdrive diagnose mine --out mine/diagnosis
 
-Writes model.toml and set.toml into the folder of the recordings and checks them as diagnose would before it searches. On a terminal it asks for what
-no option says; elsewhere what is missing is an error that names its option, or with --yes the default, where there is one. Columns are named by
-their headings, with or without their unit; of bags they are TOPIC.FIELD, such as /joint_states.position[0]. A heading states its unit in brackets, in
-parentheses or behind a slash: q [deg], q (deg), q / deg. Without any unit SI units are assumed and named, and values that contradict that are refused.
+Writes model.toml and set.toml into the folder of the recordings and checks them as diagnose does. On a terminal it asks for missing options.
+Otherwise a missing option is an error that names it; with --yes the default is used if there is one.
+Columns are named by their headings, with or without unit; for bags by TOPIC.FIELD, such as /joint_states.position[0].
+A heading states its unit in brackets, in parentheses or after a slash: q [deg], q (deg), q / deg. Without a unit, SI units are assumed and
+reported; values that contradict them are refused.
 
-Tables without a heading or without times (--columns, --rate) and .npz, .npy, .mat and .parquet files become bags in the folder bags/ beside the set.
+Tables without a heading or times (--columns, --rate) and .npz, .npy, .mat and .parquet files are converted to bags in the folder bags/.
 
-Exit codes: 0 written and fine; 2 usage; 3 a recording is wrong, a file exists, or diagnose would refuse what was written; 5 a file cannot be written.";
+Exit codes: 0 written and checked; 2 usage; 3 a recording is wrong, a file exists, or diagnose would refuse what was written; 5 a file cannot be written.";
 
 /// `backdrive init`
 #[derive(Debug, Clone, Default, Args)]
@@ -31,17 +32,17 @@ pub struct Init {
     /// A recording (CSV, MCAP, NumPy, MATLAB or parquet); may be given several times. Without this all in the folder.
     #[arg(long, value_name = "FILE")]
     pub recording: Vec<PathBuf>,
-    /// The recording that no fit sees. Without this the one that is driven neither most nor least.
+    /// The held-out recording. Without this the one with medium excitation.
     #[arg(long, value_name = "FILE")]
     pub held_out: Option<PathBuf>,
-    /// Names of the columns of tables that have no heading, in their order; a name may state its unit.
+    /// For tables without a heading: the names of the columns in order; a name may include a unit.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub columns: Vec<String>,
-    /// Rows per second of tables in which no column is the time.
+    /// For tables without a time column: rows per second.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Whether it moves along a line or turns.
-    #[arg(long, value_parser = choices([("translation", "Along a line: m, kg, N", Motion::Translation), ("rotation", "It turns: rad, kg m², N m", Motion::Rotation)]))]
+    /// Whether it translates or rotates.
+    #[arg(long, value_parser = choices([("translation", "Translation: m, kg, N", Motion::Translation), ("rotation", "Rotation: rad, kg m², N m", Motion::Rotation)]))]
     pub motion: Option<Motion>,
     /// What is prescribed and recorded: a force (a torque), a motor's current, or a motion whose reaction force is measured.
     #[arg(long, value_parser = choices([
@@ -50,65 +51,65 @@ pub struct Init {
         ("motion", "A prescribed motion", Driven::Motion),
     ]))]
     pub driven: Option<Driven>,
-    /// The column of it.
+    /// The column of this input.
     #[arg(long, value_name = "COLUMN")]
     pub drive: Option<String>,
-    /// Its unit, where the heading names none.
+    /// Its unit, if the heading states none.
     #[arg(long, value_name = "UNIT")]
     pub drive_unit: Option<String>,
-    /// The motor's constant, N/A or N m/A; a gear's ratio is part of it.
+    /// The motor constant including the gear ratio, N/A or N m/A.
     #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
     pub constant: Option<f64>,
     /// The column of the time; without this t or time.
     #[arg(long, value_name = "COLUMN")]
     pub time: Option<String>,
-    /// Its unit, where the heading names none: s, ms, us, ns, min.
+    /// Its unit, if the heading states none: s, ms, us, ns, min.
     #[arg(long, value_name = "UNIT")]
     pub time_unit: Option<String>,
-    /// The column of a measured position or angle; `none` where there is none.
+    /// The column of a measured position or angle; `none` if there is none.
     #[arg(long, value_name = "COLUMN|none")]
     pub position: Option<String>,
-    /// Its unit, where the heading names none.
+    /// Its unit, if the heading states none.
     #[arg(long, value_name = "UNIT")]
     pub position_unit: Option<String>,
-    /// Size of one count, m or rad, where the position (or, without --position, the prescribed motion) is in counts.
+    /// Size of one count, m or rad, if the position (or, without --position, the prescribed motion) is in counts.
     #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
     pub per_count: Option<f64>,
-    /// Step of the position's encoder, m or rad; without this what the samples show.
+    /// Resolution of the position encoder, m or rad; without this estimated from the samples.
     #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
     pub resolution: Option<f64>,
-    /// The column of a measured velocity; `none` where there is none.
+    /// The column of a measured velocity; `none` if there is none.
     #[arg(long, value_name = "COLUMN|none")]
     pub velocity: Option<String>,
-    /// Its unit, where the heading names none.
+    /// Its unit, if the heading states none.
     #[arg(long, value_name = "UNIT")]
     pub velocity_unit: Option<String>,
-    /// The column of a measured force (or torque): of a prescribed motion its reaction, else that in the joint to a load; `none` where there is none.
+    /// The column of a measured force (or torque): the reaction of a prescribed motion, or the force in the joint to a load; `none` if there is none.
     #[arg(long, value_name = "COLUMN|none")]
     pub force: Option<String>,
-    /// Its unit, where the heading names none.
+    /// Its unit, if the heading states none.
     #[arg(long, value_name = "UNIT")]
     pub force_unit: Option<String>,
-    /// What the driven body holds on to: nothing, a spring to the frame (a specimen, a return spring), or a load behind a joint that yields.
+    /// What is attached to the driven body: nothing, a spring to the frame (a specimen, a return spring), or a load behind a compliant joint.
     #[arg(long, value_parser = choices([
         ("nothing", "Nothing but its own mass and bearing", Attached::Nothing),
         ("spring", "A spring to the frame", Attached::Spring),
-        ("load", "A second body behind a joint that yields", Attached::Load),
+        ("load", "A second body behind a compliant joint", Attached::Load),
     ]))]
     pub attached: Option<Attached>,
-    /// Roughly where a load rings against the motor, Hz.
+    /// Approximate resonance of the load against the motor, Hz.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub resonance: Option<f64>,
-    /// A hand that nobody measured holds the device: it becomes a slow curve that is found with the rest.
+    /// A hand whose motion was not measured holds the device: its motion is estimated as a slow curve.
     #[arg(long, num_args = 0..=1, default_missing_value = "yes", value_parser = choices([("yes", "Yes", true), ("no", "No", false)]))]
     pub hand: Option<bool>,
     /// The moving mass, kg, or inertia, kg m^2; without this an estimate from the recordings.
     #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
-    /// How each recording begins. Without this what the samples show.
+    /// Initial state of each recording. Without this it is estimated from the samples.
     #[arg(long, value_parser = choices([("rest", "At rest at the first sample", Start::Rest), ("free", "In any state", Start::Free)]))]
     pub start: Option<Start>,
-    /// Take the default of every question that no option answers.
+    /// Use the default for every question that no option answers.
     #[arg(long)]
     pub yes: bool,
     /// Replace model.toml and set.toml if they exist.

@@ -8,12 +8,12 @@ use std::path::PathBuf;
 pub enum Model {
     /// Print the network, its modes and its frequency response.
     #[command(
-        after_help = "Example:\n  backdrive model show plant/models/impulse-engine.toml --grip plant/grips/normal.toml\n\nExit codes: 0 shown, 2 usage, 3 a file is wrong or too large to look at, 5 standard output cannot be written."
+        after_help = "Example:\n  backdrive model show plant/models/impulse-engine.toml --grip plant/grips/normal.toml\n\nExit codes: 0 shown, 2 usage, 3 a file is wrong or too large to show, 5 standard output cannot be written."
     )]
     Show(ModelFile),
     /// Check a model file; errors point at the line.
     #[command(
-        after_help = "Example:\n  backdrive model check plant/models/impulse-engine.toml\n\nExit codes: 0 fine, 2 usage, 3 the file is wrong, or holds nothing that moves."
+        after_help = "Example:\n  backdrive model check plant/models/impulse-engine.toml\n\nExit codes: 0 fine, 2 usage, 3 the file is wrong, or contains no moving body."
     )]
     Check(ModelFile),
 }
@@ -26,10 +26,10 @@ pub struct ModelFile {
     /// Grip or environment to attach at the model's user's body.
     #[arg(long, value_name = "FILE")]
     pub grip: Option<PathBuf>,
-    /// Amplitude of motion at which hysteresis, friction and backlash are looked at, m or rad; very small if not given.
+    /// Amplitude of motion for the linearisation of hysteresis, friction and backlash, m or rad; very small if not given.
     #[arg(long, value_name = "M")]
     pub amplitude: Option<f64>,
-    /// Print it as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
 }

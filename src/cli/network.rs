@@ -3,16 +3,16 @@
 use backdrive_launch::asked::Asked;
 use clap::Args;
 
-/// Where on the network ROS 2 is spoken.
+/// Network settings of ROS 2.
 #[derive(Debug, Clone, Default, Args)]
 pub struct Network {
-    /// ROS domain, 0 to 232, in place of ROS_DOMAIN_ID.
+    /// ROS domain, 0 to 232, instead of ROS_DOMAIN_ID.
     #[arg(long, value_name = "N")]
     pub domain: Option<u16>,
-    /// Name or address of a network interface to use; may be given again. All without.
+    /// Name or address of a network interface to use; may be given several times. Without this all.
     #[arg(long, value_name = "NAME")]
     pub interface: Vec<String>,
-    /// Address (IPv4) or name of a host to tell by unicast, where there is no multicast; may be given again.
+    /// Address (IPv4) or name of a host to reach by unicast, if there is no multicast; may be given several times.
     #[arg(long, value_name = "HOST")]
     pub peer: Vec<String>,
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub const HELP: &str = "Example:
   backdrive replay contact.mcap --mu 1 --lambda 0.6 --bag again.mcap
 
-Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told, as of a bag that was cut short.";
+Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 not known, such as for a bag that was cut off.";
 
 /// `backdrive replay`
 #[derive(Debug, Args)]

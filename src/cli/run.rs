@@ -16,21 +16,21 @@ pub const HELP: &str = "Examples:
 
 A bag that the graph file names and that exists already is kept: the run writes NAME-2.mcap, NAME-3.mcap, ... and reports it.
 
-Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told; 4 data lost, 6 a node failed, 130 interrupted.";
+Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 not known; 4 data lost, 6 a node failed, 130 interrupted.";
 
 /// `backdrive run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// The graph file; or a bag, whose graph is run with the files and options of the recorded run.
+    /// The graph file, or a bag: its graph is run with the files and options of the recorded run.
     pub graph: PathBuf,
-    /// How messages travel: shared memory without --host, else ROS 2.
+    /// Transport of messages: shared memory without --host, otherwise ROS 2.
     #[arg(long, value_parser = choices([
         ("iceoryx2", "A process per node over shared memory", Transport::Iceoryx2),
         ("ros2", "A process per node over ROS 2 (DDS)", Transport::Ros2),
         ("inproc", "All nodes in this process", Transport::Inproc),
     ]))]
     pub transport: Option<Transport>,
-    /// Run only the nodes of this host of the graph, together with the other hosts.
+    /// Run only the graph's nodes of this host, together with the other hosts.
     #[arg(long, value_name = "NAME")]
     pub host: Option<String>,
     /// File with the secret that the hosts share, made by `backdrive secret FILE` and copied to each; needed with --host.
@@ -39,7 +39,7 @@ pub struct Run {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub network: Network,
-    /// How time runs.
+    /// Clock of the run.
     #[arg(long, value_parser = choices([
         ("lockstep", "As fast as the machine allows, and reproducible", Clock::Lockstep),
         ("realtime", "With the wall clock", Clock::Realtime),

@@ -3,10 +3,10 @@
 use clap::Args;
 use std::path::PathBuf;
 
-/// How a run's result is given.
+/// Output of a run's result.
 #[derive(Debug, Args)]
 pub struct RunResult {
-    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
+    /// Write a page about the run as one HTML file: result, signals, contact, timing, losses, events.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Print the result as JSON.

@@ -12,6 +12,6 @@ Exit codes: 0 made, 2 usage, 3 the file exists or cannot be written.";
 /// `backdrive secret`
 #[derive(Debug, Args)]
 pub struct Secret {
-    /// The file to make, readable by its user alone.
+    /// The file to create, readable only by its owner.
     pub file: PathBuf,
 }

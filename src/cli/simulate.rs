@@ -20,7 +20,7 @@ pub struct Simulate {
     /// Replace files that exist.
     #[arg(long)]
     pub overwrite: bool,
-    /// Where the prediction goes, as CSV; for a set a folder.
+    /// File for the prediction (CSV); for a set a folder.
     #[arg(long, visible_alias = "csv", value_name = "FILE")]
     pub out: PathBuf,
     /// Grip or environment to attach at the model's user's body.
@@ -35,10 +35,10 @@ pub struct Simulate {
     /// Substeps per sample; chosen from the model if not given.
     #[arg(long)]
     pub substeps: Option<usize>,
-    /// Add the sensors' noise and rounding, with this seed.
+    /// Add the sensors' noise and quantisation, with this seed.
     #[arg(long, value_name = "SEED")]
     pub noise: Option<u64>,
-    /// Columns that are named differently: a set.toml whose `[columns]` are used.
+    /// A set.toml whose `[columns]` map column names to the model's signals.
     #[arg(long, value_name = "SET.TOML")]
     pub columns: Option<PathBuf>,
     /// Print the result as JSON.

@@ -14,35 +14,35 @@ pub const HELP: &str = "Examples:
   backdrive stability session/ --roles roles.toml --gain 1
   backdrive stability two-levers.csv --roles roles.toml
 
-Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 it cannot be told, 130 interrupted.";
+Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 not known, 130 interrupted.";
 
 /// `backdrive stability`
 #[derive(Debug, Args)]
 pub struct Stability {
     /// The bag of a run; with --roles any MCAP file, a rosbag2 folder, or a table (CSV).
     pub recording: PathBuf,
-    /// The gain product mu*lambda asked about, reached by lambda; without it the bag's own.
+    /// The loop gain mu*lambda to judge, set by lambda; without this that of the bag.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with_all = ["mu", "lambda"])]
     pub gain: Option<f64>,
-    /// Position scale asked about; the bag's own if not given.
+    /// Position scale mu to judge; without this that of the bag.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub mu: Option<f64>,
-    /// Force scale asked about; the bag's own if not given.
+    /// Force scale lambda to judge; without this that of the bag.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub lambda: Option<f64>,
-    /// Draw the whole curve: this many gains from one to another, evenly spaced in their logarithm.
+    /// Compute the whole curve: gains FROM to TO, COUNT of them, evenly spaced on a logarithmic scale.
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = gains)]
     pub sweep: Option<Gains>,
-    /// Factors on the stiffness and damping of the grip, over which the answer is given.
+    /// Factors on the stiffness and damping of the grip for which the answer is given.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 0.85, 1.0, 1.15, 1.3])]
     pub grips: Vec<f64>,
-    /// A graph file whose operator's hand is played, in place of the hand in the bag.
+    /// A graph file whose operator is used instead of the recorded hand.
     #[arg(long, value_name = "GRAPH")]
     pub script: Option<PathBuf>,
-    /// Which topic or column is which, for a recording that we did not make; see docs/roles-example.toml.
+    /// The roles of topics or columns, for a recording that backdrive did not make; see docs/roles-example.toml.
     #[arg(long, value_name = "FILE")]
     pub roles: Option<PathBuf>,
-    /// Law between master and slave that is asked about, in the place of the bag's scaling or of its coupling's law; see docs/couplings.md.
+    /// Coupling law to judge, instead of the bag's scaling or coupling law; see docs/couplings.md.
     #[arg(long, value_name = "LAW", value_parser = law())]
     pub coupling: Option<String>,
     /// Write the report as one HTML file.

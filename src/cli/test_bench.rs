@@ -10,12 +10,12 @@ pub const HELP: &str = "Example:
   backdrive test-bench out/bench/unfired.mcap out/bench/map.mcap out/bench/lag.mcap --dragged out/bench/unfired-other.mcap --cycle out/bench/validation.mcap \\
     --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out out/identified
 
-Exit codes: 0 identified, 2 usage, 3 a bag does not hold what is needed, 5 the folder cannot be written.";
+Exit codes: 0 identified, 2 usage, 3 a bag lacks a needed signal, 5 the folder cannot be written.";
 
 /// `backdrive test-bench`
 #[derive(Debug, Args)]
 pub struct TestBench {
-    /// Bag of the bench dragged (pedal at 0) and shaken by the dynamometer.
+    /// Bag of the bench with pedal 0, excited by the dynamometer.
     pub unfired: PathBuf,
     /// Bag of stationary points of pedal and speed.
     pub map: PathBuf,
@@ -27,19 +27,19 @@ pub struct TestBench {
     /// Bag of a test cycle, for validation; with --dragged.
     #[arg(long, value_name = "BAG", requires = "dragged")]
     pub cycle: Option<PathBuf>,
-    /// J_C of the data sheet, where the search starts, kg m2.
+    /// J_C of the data sheet (start value), kg m2.
     #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
     pub engine_inertia: f64,
-    /// Torsional stiffness of the data sheet, where the search starts, N m/rad.
+    /// Torsional stiffness of the data sheet (start value), N m/rad.
     #[arg(long, value_name = "NM_RAD", value_parser = positive, allow_negative_numbers = true)]
     pub stiffness: f64,
-    /// Most power of the dynamometer by its plate, W.
+    /// Rated power of the dynamometer, W.
     #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
     pub power: f64,
     /// Folder for engine.toml, dynamometer.toml and shaft.toml.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Shortest stretch of one pedal and speed that counts as stationary, s.
+    /// Shortest duration of constant pedal and speed that counts as stationary, s.
     #[arg(long, value_name = "S", value_parser = positive, default_value_t = 3.5, allow_negative_numbers = true)]
     pub plateau: f64,
     /// Pedals between which the lag is linear, %, rising.
@@ -51,7 +51,7 @@ pub struct TestBench {
     /// Order of magnitude of the speeds' noise, rad/s: the observer's D.
     #[arg(long, value_name = "RAD_S", value_parser = positive, default_value_t = 0.02, allow_negative_numbers = true)]
     pub noise: f64,
-    /// How fast the engine's torque changes, N m/s: the observer's weight.
+    /// Rate of change of the engine's torque, N m/s: the observer's weight.
     #[arg(long, value_name = "NM_S", value_parser = positive, default_value_t = 200.0, allow_negative_numbers = true)]
     pub torque_rate: f64,
     /// m of the observer's matrix inequality over the least there is, above 1.

@@ -82,7 +82,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
         answer::to_do(&steps)?;
     }
     if stop.load(Ordering::SeqCst) {
-        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; the results so far are written".to_string() });
     }
     Ok(found.verdict.word)
 }
@@ -98,20 +98,18 @@ fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
             format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
             use_it(),
         )),
-        Word::Ambiguous => steps.push(Step::new(
-            format!("{name} may be used, but the physics named first could be another one: see the table below."),
-            use_it(),
-        )),
-        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs ask for nothing more.")),
+        Word::Ambiguous => steps
+            .push(Step::new(format!("{name} may be used, but the first effect could be a different one: see the table below."), use_it())),
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs show no missing effect.")),
         Word::Unexplained => steps.push(Step::said(
-            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors of the joints named there first.",
+            "Do not use a law yet: see below when and where the residual appears, and first check the sensors of the joints named there.",
         )),
         Word::CannotTell => {}
     }
     if verdict.word != Word::Unexplained {
         for joint in verdict.arm.iter().flat_map(|a| &a.joints) {
             if let Some(open) = unexplained(joint) {
-                steps.push(Step::said(format!("Look at what is left over {open}.")));
+                steps.push(Step::said(format!("Check the residual {open}.")));
             }
         }
     }
@@ -159,7 +157,7 @@ fn text(problem: &Problem, found: &Found) -> String {
             line(
                 &joint.joint,
                 format!(
-                    "of its torque (rms {} {unit}) remain {:.1} % as given, {:.1} % refitted, {:.1} % diagnosed{in_loop}",
+                    "of its torque (rms {} {unit}) remain unexplained: {:.1} % as given, {:.1} % refitted, {:.1} % diagnosed{in_loop}",
                     number(joint.torque_rms),
                     100.0 * joint.as_given,
                     100.0 * joint.refit,
@@ -210,12 +208,12 @@ fn finding_text(finding: &Finding) -> String {
 
 /// What the search fitted in full, round by round.
 fn explained(tried: &[Tried]) -> String {
-    let mut out = format!("{:<64} {:>12} {:>12}  taken up", "fitted", "worth", "unseen, sd");
+    let mut out = format!("{:<64} {:>12} {:>12}  accepted", "fitted", "worth", "held out, sd");
     for one in tried {
         let name = format!("{} {}", words(&one.physics), said::place(&one.place));
         let unseen = one.unseen.map_or("-".to_string(), |u| format!("{u:.1}"));
         let _ = write!(out, "\n{name:<64} {:>12.1} {unseen:>12}  {}", one.worth, if one.taken { "yes" } else { "no" });
     }
-    out += "\nworth: rise of twice the log evidence, more than 10 is claimed; unseen: how much better it predicts stretches that its fit has not seen";
+    out += "\nworth: rise of twice the log evidence, more than 10 is claimed; held out: improvement of the prediction of held-out segments";
     out
 }

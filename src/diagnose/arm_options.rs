@@ -14,50 +14,50 @@ pub fn notes(options: &cli::Diagnose, set: &RecordingSet) -> Result<Vec<String>,
     let usage = |message: String| Failure { code: code::USAGE, message };
     if let Some(grip) = options.grip.as_deref().filter(|g| *g != Path::new("none")) {
         return Err(usage(format!(
-            "--grip {}: a hand on an arm is not modelled by its diagnosis; leave the option out, and record the arm without a hand",
+            "--grip {}: the diagnosis of an arm does not model a hand; omit the option, and record the arm without a hand",
             grip.display()
         )));
     }
     let file = set.folder.join("set.toml");
     if let Some((input, _)) = set.unknown.first() {
         return Err(Failure::input(format!(
-            "{}, unknown.{input}: an arm is diagnosed from the torque of every joint, and none may be unknown; leave the key out",
+            "{}, unknown.{input}: an arm is diagnosed from the torque of every joint, and none may be unknown; omit the key",
             file.display()
         )));
     }
     let conditions = set.files.iter().find_map(|(name, rules)| Some((name, &rules.condition.first()?.0)));
     if let Some((name, path)) = conditions {
         return Err(Failure::input(format!(
-            "{}, files.\"{name}\".condition.{path}: logs of an arm are all fitted with the same numbers; diagnose those with another {path} in a set \
-             of their own",
+            "{}, files.\"{name}\".condition.{path}: all logs of an arm are fitted with the same parameters; diagnose those with another \
+             {path} in a separate set",
             file.display()
         )));
     }
     let mut out = Vec::new();
     if options.effort.is_some() {
-        out.push("--effort does nothing for an arm: every physics is tried at every joint, and the search ends by itself".to_string());
+        out.push("--effort has no effect for an arm: every effect is tried at every joint".to_string());
     }
     if options.patience.is_some() {
-        out.push("--patience does nothing for an arm: its search has no clock, and is not cut off".to_string());
+        out.push("--patience has no effect for an arm: its search has no time limit".to_string());
     }
     for name in &options.ignore_signal {
-        out.push(format!("--ignore-signal {name} does nothing for an arm: of its logs only the columns of its joints are read"));
+        out.push(format!("--ignore-signal {name} has no effect for an arm: only the columns of its joints are read from its logs"));
     }
     for name in options.without.iter().filter(|name| !ALL.iter().any(|p| p.facts().name == name.as_str())) {
         let of_arms: Vec<&str> = ALL.iter().map(|p| p.facts().name).collect();
-        out.push(format!("--without {name} does nothing for an arm, whose search has {}", of_arms.join(", ")));
+        out.push(format!("--without {name} has no effect for an arm, whose search has {}", of_arms.join(", ")));
     }
     for name in &set.ignore {
         out.push(format!(
-            "{}, ignore: \"{name}\" does nothing for an arm: of its logs only the columns of its joints are read",
+            "{}, ignore: \"{name}\" has no effect for an arm: only the columns of its joints are read from its logs",
             file.display()
         ));
     }
     if set.initial == Initial::Free {
-        out.push(format!("{}, initial: does nothing for an arm, which may start in any state", file.display()));
+        out.push(format!("{}, initial: has no effect for an arm, which may start in any state", file.display()));
     }
     if set.mixed_rates {
-        out.push(format!("{}, mixed_rates: does nothing for an arm: all its logs are laid on the grid of the slowest", file.display()));
+        out.push(format!("{}, mixed_rates: has no effect for an arm: all its logs are resampled to the slowest", file.display()));
     }
     Ok(out)
 }

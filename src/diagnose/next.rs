@@ -21,27 +21,24 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
     // A canceller takes the model of a master: one that states where it is held, pushed and read.
     let is_master = !found.problem.model.axes.is_empty();
     let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
-    let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
+    let worth = format!("its error is {} of the measured signal, that of the model as given {}", percent(after), percent(before));
     let place = if is_master { "a canceller" } else { "a feed-forward or a simulation" };
     let use_it = if is_master { vec![contact(&model)] } else { vec![simulated(&model, files, Path::new("predicted.csv"))] };
     let mut steps = Vec::new();
     match found.verdict.word {
         Word::Missing | Word::Parameters => {
-            let text = format!("Use {} where the motion is predicted, such as in {place}: {worth}.", model.display());
+            let text = format!("Use {} to predict the motion, such as in {place}: {worth}.", model.display());
             steps.push(Step::new(text, use_it));
             if let Some(asked) = Some(is_master).filter(|is| *is).and_then(|_| in_the_loop(&model, files)) {
-                let text = "See what it is worth in the loop: the stability limit with it, in the recording of a contact.";
+                let text = "Compute the stability limit with it, from the recording of a contact.";
                 steps.push(Step::new(text, [Some(asked)]));
             }
         }
-        Word::Ambiguous => steps.push(Step::new(
-            format!("{} may be used ({worth}), but hold what is built on it against the rivals below too.", model.display()),
-            use_it,
-        )),
-        Word::NothingMissing => steps.push(Step::said("Keep the model: the recordings ask for nothing more.")),
-        Word::Unexplained => steps.push(Step::said(
-            "Do not build on a law yet: look at when and where the residual shows, and check the sensors named there first.",
-        )),
+        Word::Ambiguous => steps
+            .push(Step::new(format!("{} may be used ({worth}), but also test the result with the rivals below.", model.display()), use_it)),
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the recordings show no missing effect.")),
+        Word::Unexplained => steps
+            .push(Step::said("Do not use a law yet: check when and where the residual appears, and first check the sensors named there.")),
         Word::CannotTell => {}
     }
     if let Some(next) = &found.verdict.next_experiment {
@@ -51,10 +48,10 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
         steps.push(Step::said(format!("Check this signal: {remark}")));
     }
     if found.search.cut {
-        let text = "Let the search come to its end: the same command with more time on the clock.";
+        let text = "Let the search complete: the same command with a longer time limit.";
         steps.push(Step::new(text, [again("--patience", 600.0)]));
     } else if found.search.exhausted {
-        let text = "Let it search more: the same command with twice the effort.";
+        let text = "Search more: the same command with twice the effort.";
         steps.push(Step::new(text, [again("--effort", 1.0)]));
     }
     steps

@@ -43,7 +43,7 @@ pub fn diagnose(
     if let Some(grip) = options.grip.as_deref().filter(|g| *g != Path::new("none")) {
         return Err(Failure {
             code: code::USAGE,
-            message: format!("--grip {}: a hand on a servo joint is not modelled; leave the option out", grip.display()),
+            message: format!("--grip {}: a hand on a servo joint is not modelled; omit the option", grip.display()),
         });
     }
     let files: Vec<PathBuf> =
@@ -83,7 +83,7 @@ fn to_do(word: Word, out: &Path) -> Vec<Step> {
     let model = out.join(MODEL_FILE);
     let usable = matches!(word, Word::Missing | Word::Parameters | Word::NothingMissing);
     let show = || Builder::verb("model show").reads(&model).build();
-    usable.then(|| Step::new(format!("Use {}; this shows its numbers:", model.display()), [show()])).into_iter().collect()
+    usable.then(|| Step::new(format!("Use {}; this shows its parameters:", model.display()), [show()])).into_iter().collect()
 }
 
 /// What was found, for a terminal.
@@ -115,7 +115,8 @@ fn text(problem: &Problem, found: &Found) -> String {
         line(
             &joint.joint,
             format!(
-                "free run from the command: nrmse {} diagnosed, {} with delay and second order, {} of the command itself; mean error {} mrad diagnosed, {} and {}",
+                "free run from the command: nrmse {} diagnosed, {} with delay and second order, {} for the command itself; mean error {} \
+                    mrad diagnosed, {} and {}",
                 share(e.diagnosed),
                 share(e.refit),
                 share(e.command),
@@ -135,7 +136,7 @@ fn text(problem: &Problem, found: &Found) -> String {
             told.push(&shared.sentence);
             let joints: Vec<&str> =
                 servo.joints.iter().filter(|j| j.shared.iter().any(|s| s.sentence == shared.sentence)).map(|j| j.joint.as_str()).collect();
-            line("open", format!("{}: {}; to tell them apart, {}", joints.join(", "), shared.sentence, shared.separated_by));
+            line("open", format!("{}: {}; to separate them, {}", joints.join(", "), shared.sentence, shared.separated_by));
         }
     }
     for note in &found.notes {
@@ -165,12 +166,12 @@ fn finding_text(finding: &Finding) -> String {
 
 fn looked_at(adds: &[&str], drops: Option<&str>) -> String {
     let adds: Vec<String> = adds.iter().map(|name| words(name)).collect();
-    format!("{}{}", adds.join(" and "), drops.map_or(String::new(), |d| format!(" in the place of {}", words(d))))
+    format!("{}{}", adds.join(" and "), drops.map_or(String::new(), |d| format!(" instead of {}", words(d))))
 }
 
 /// What the search looked at, joint by joint.
 fn explained(problem: &Problem, found: &Found) -> String {
-    let mut out = format!("{:<20} {:<58} {:>10} {:>12}  taken up", "joint", "looked at", "lowers", "unseen, sd");
+    let mut out = format!("{:<20} {:<58} {:>10} {:>12}  accepted", "joint", "effect", "lowers", "held out, sd");
     for answer in &found.answers {
         for tried in &answer.found.tried {
             let unseen = tried.gain.map_or("-".to_string(), |g| format!("{:.1}", g.in_errors()));
@@ -184,6 +185,6 @@ fn explained(problem: &Problem, found: &Found) -> String {
             );
         }
     }
-    out += "\nlowers: by which share it lowers the mean loss on recordings that its fit has not seen; unseen: that gain in its own standard errors";
+    out += "\nlowers: the share by which it lowers the mean loss on held-out recordings; held out: that gain in its standard errors";
     out
 }

@@ -32,7 +32,7 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         return each_experiment(options, &way, &graph, &changes);
     }
     if options.out.is_some() {
-        return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
+        return Err(Failure::input(format!("{}: has no [[experiments]], so --out has no effect; use --bag", options.graph.display())));
     }
     if let Some(html) = &options.result.html {
         output::writable(html)?;
@@ -87,7 +87,7 @@ pub fn clean() -> Result<u8, Failure> {
         output::line(format_args!("removed {} and {} files in shared memory", run.root.display(), run.shm.len()))?;
     }
     for run in &swept.alive {
-        output::line(format_args!("{run} is alive and was left alone"))?;
+        output::line(format_args!("{run} is running and was not touched"))?;
     }
     for failure in &swept.failed {
         output::note(format_args!("error: {failure}"));

@@ -36,12 +36,12 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
     match summary.and_then(|s| s.outcome) {
         Some(Outcome::NotJudged { why }) => steps.push(Step::said(why.advice())),
         Some(Outcome::Stable) if graph.gains.lambda > 0.0 => steps.push(Step::new(
-            "Ask how far away the stability limit is, and whether the loop stays stable with firmer and softer grips.",
+            "Find out how far the stability limit is, and whether the loop stays stable with stiffer and softer grips.",
             ask("stability", "stability.html"),
         )),
         None | Some(Outcome::Stable) => {}
         Some(_) => {
-            steps.push(Step::new("Ask why it is not stable, and what would stop it.", ask("why", "why.html")));
+            steps.push(Step::new("Find out why it is not stable, and what would stabilise it.", ask("why", "why.html")));
             let gain = summary.map_or(1.0, |s| s.loop_gain);
             steps.push(Step::new(
                 format!("Find the gain up to which this loop is stable (it is not at {}).", number(gain)),
@@ -54,14 +54,14 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
                 (None, _) => None,
             };
             let again = again.and_then(|again| again.option("--lambda", lower).option_writes("--html", Path::new("lower.html")).build());
-            steps.push(Step::new("Run it again from the recorded hand with half the force scale.", [again]));
+            steps.push(Step::new("Re-simulate it with the recorded hand and half the force scale.", [again]));
         }
     }
     if let Some(bag) = done.bag.as_deref().filter(|_| !done.complete && done.lost == 0) {
-        steps.push(Step::new("The bag was cut off: make a clean copy of what it holds.", [recover(bag)]));
+        steps.push(Step::new("The bag was cut off: make a clean copy of its content.", [recover(bag)]));
     }
     if done.lost > 0 || done.report.as_ref().is_some_and(|r| r.missed_deadlines > 0) {
-        steps.push(Step::new("See what of this machine delays messages.", [Builder::verb("doctor").build()]));
+        steps.push(Step::new("Find out what delays messages on this machine.", [Builder::verb("doctor").build()]));
     }
     steps
 }

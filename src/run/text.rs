@@ -83,7 +83,7 @@ fn text(done: &Done) -> String {
             Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } | Cause::Stranger { .. } => "",
         };
         if report.refused > 0 {
-            lines.push(format!("refused  {} messages of strangers; none was used", report.refused));
+            lines.push(format!("refused  {} messages from outside the run; none was used", report.refused));
         }
         for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
             lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
@@ -160,7 +160,7 @@ fn happened(summary: &Summary) -> String {
         let gain = format!("at mu*lambda = {}{later}", summary.loop_gain);
         match outcome {
             Outcome::NotJudged { why } => {
-                lines.push(format!("loop     it cannot be told whether it is stable {gain}: {why}"));
+                lines.push(format!("loop     not known whether it is stable {gain}: {why}"));
                 lines.push(format!("to do    {}", why.advice()));
             }
             outcome => lines.push(format!("loop     {outcome} {gain}")),
@@ -200,8 +200,8 @@ fn timing(report: &RunReport) -> Vec<String> {
     )];
     if share > MANY_MISSED {
         lines.push(
-            "to do    lower --rate, close programs beside the run, or let it run in real time: `backdrive doctor` says what this machine lacks \
-             (SCHED_FIFO, timers)"
+            "to do    lower --rate, close other programs, or allow real-time scheduling: `backdrive doctor` reports what this machine \
+             lacks (SCHED_FIFO, timers)"
                 .to_string(),
         );
     }

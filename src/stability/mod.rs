@@ -25,7 +25,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let how = resolved(options);
     let mut asked = progress::busy(&format!("reading {}", options.recording.display()), || Asked::read(&how))?;
     if asked.is_cut {
-        asked.session.notes.push(with_recover("the bag was not closed: what it holds is used", &options.recording));
+        asked.session.notes.push(with_recover("the bag was not closed: its remaining content is used", &options.recording));
     }
     let question = asked.question(&how)?;
     if let Some(html) = &options.html {

@@ -22,7 +22,7 @@ pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> 
         (Word::Stable, Some(limit), _) => {
             let db = 20.0 * (limit / gain).log10();
             let advice = match lower(limit) < gain {
-                true => "That is little: a firmer hand or an older cable may use it up.",
+                true => "That is little: a stiffer grip or an older cable may use it up.",
                 false => "The gain may rise.",
             };
             steps.push(Step::said(format!(
@@ -30,17 +30,18 @@ pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> 
                 number(db),
                 number(lower(limit))
             )));
-            let text = "See what happens up to the stability limit and beyond it, before a hand feels it.";
+            let text = "Compute the motion up to the stability limit and above it, before a hand feels it.";
             steps.push(Step::new(text, [at(found, options, asked, limit, "at-the-limit.html")]));
         }
-        (Word::Stable, None, Some(least)) => steps
-            .push(Step::said(format!("No limit was found for a higher gain up to μλ = {}: that is how far was looked.", number(least)))),
+        (Word::Stable, None, Some(least)) => {
+            steps.push(Step::said(format!("No stability limit was found up to μλ = {}, the highest gain searched.", number(least))))
+        }
         (Word::LimitCycle | Word::Unstable | Word::Limited, limit, least) if limit.or(least).is_some_and(|limit| limit > 0.0) => {
             let safe = lower(limit.or(least).unwrap_or(gain)).min(gain);
             steps.push(Step::new(
                 format!(
-                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, at the price of a reflected force of {} of what it \
-                     would be now.",
+                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, with a reflected force of {} \
+                     of the present one.",
                     number(safe),
                     percent(safe / gain)
                 ),
@@ -55,7 +56,7 @@ pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> 
         steps.push(Step::new(text, dithered(options, asked, advice)));
     }
     if found.checks.iter().any(|c| !c.agrees) {
-        steps.push(Step::new("A model does something else than its device: find out what it lacks, and ask again.", [why(options)]));
+        steps.push(Step::new("A model differs from its device: find out which effect it lacks, and ask again.", [why(options)]));
     }
     steps
 }
@@ -88,11 +89,11 @@ fn cancelled(options: &cli::Stability, asked: Option<&Graph>) -> Option<Step> {
     let graph = asked?;
     let Settings::Canceller(files, ..) = &graph.node_of(NodeKind::Canceller)?.settings else { return None };
     if files.model.is_some() {
-        let text = "Or cancel with a better model of the master: this finds what the present one lacks.";
+        let text = "Or use a better model of the master in the canceller: this command finds what the present one lacks.";
         return Some(Step::new(text, [why(options)]));
     }
     let again = Builder::again().without("--sweep", true).without("--json", false).option_writes("--html", Path::new("cancelled.html"));
-    let text = "Or take the induced master motion out by a canceller. With the model and the grip that the graph gives its master:";
+    let text = "Or subtract the induced motion of the master with a canceller. With the model and the grip of the graph's master:";
     Some(Step::new(text, [again.option("--canceller", "master").option("--high-pass", 1).build()]))
 }
 

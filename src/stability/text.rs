@@ -81,21 +81,21 @@ fn edge(found: &Answer, lines: &mut Lines) {
             let ci = found.critical_gain_ci95.map_or(String::new(), |ci| format!(" (95 %: {})", interval(ci)));
             let hz = match found.critical_frequency_hz {
                 Some(hz) if hz > 0.0 => format!(" at {hz:.1} Hz"),
-                Some(_) => ", where it runs away without oscillating".to_string(),
+                Some(_) => ", where it diverges without oscillating".to_string(),
                 None => String::new(),
             };
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
-            lines.put("edge", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
+            lines.put("limit", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
         }
         (None, Some(_)) if found.limited_from.is_some() => {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             let from = found.limited_from.unwrap_or_default();
             lines.put(
-                "edge",
-                format!("from mu*lambda = {from:.3} on a clamp acts or the travel is left, before any oscillation{by}{recorded}"),
+                "limit",
+                format!("from mu*lambda = {from:.3} on a clamp acts or the master leaves its travel, before any oscillation{by}{recorded}"),
             );
         }
-        (None, Some(least)) => lines.put("edge", format!("none up to mu*lambda = {least:.3}{recorded}")),
+        (None, Some(least)) => lines.put("limit", format!("none up to mu*lambda = {least:.3}{recorded}")),
         _ => {}
     }
 }
@@ -110,9 +110,9 @@ fn margins(found: &Answer, lines: &mut Lines) {
         .map(|least| 20.0 * (least / found.gain.product()).log10());
     let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{v:.2} {unit}"));
     let to_edge = match (gain_db, at_least) {
-        (Some(db), _) => Some(format!("gain {db:.2} dB to the edge")),
+        (Some(db), _) => Some(format!("gain {db:.2} dB to the stability limit")),
         (None, Some(db)) if db > 0.0 => Some(format!("gain at least {db:.2} dB")),
-        _ if to_clamp.is_some() => to_clamp.map(|db| format!("gain {db:.2} dB to where a clamp acts or the travel is left")),
+        _ if to_clamp.is_some() => to_clamp.map(|db| format!("gain {db:.2} dB to where a clamp acts or the master leaves its travel")),
         _ => None,
     };
     // Margins of another critical gain than the reported one would contradict it.
@@ -140,7 +140,7 @@ fn margins(found: &Answer, lines: &mut Lines) {
 fn axes_together(found: &Answer, lines: &mut Lines) {
     let loops = match &found.loops {
         None => return,
-        Some(Err(why)) => return lines.put("axes", format!("their loops together are not told from the models: {why}")),
+        Some(Err(why)) => return lines.put("axes", format!("their joint stability does not follow from the models: {why}")),
         Some(Ok(loops)) => loops,
     };
     let limit = |limit: &Limit| match (limit.critical_gain, limit.frequency_hz) {
@@ -150,13 +150,13 @@ fn axes_together(found: &Answer, lines: &mut Lines) {
     };
     let each: Vec<String> = loops.alone.iter().map(|(axis, alone)| format!("{axis} {}", limit(alone))).collect();
     let now = match loops.encirclements {
-        0 => "at the gain asked their eigenloci do not encircle +1: stable".to_string(),
-        n => format!("at the gain asked their eigenloci encircle +1: {n} unstable poles"),
+        0 => "at the requested gain their eigenloci do not encircle +1: stable".to_string(),
+        n => format!("at the requested gain their eigenloci encircle +1: {n} unstable poles"),
     };
     lines.put(
         "axes",
         format!(
-            "together stable {} (generalised Nyquist criterion; the models about the contact, without dry friction); {now}",
+            "together stable {} (generalised Nyquist criterion; models linearised in contact, without dry friction); {now}",
             limit(&loops.together)
         ),
     );
@@ -165,7 +165,7 @@ fn axes_together(found: &Answer, lines: &mut Lines) {
         lines.put("", CANCELLED.to_string());
     }
     if loops.alone_misleads() {
-        lines.put("", "the axes act on each other round the loop: what each allows alone is no answer for all of them".to_string());
+        lines.put("", "the axes interact through the loop: their separate limits are no answer for all axes together".to_string());
     }
 }
 
@@ -177,7 +177,7 @@ fn run_again(found: &Answer, lines: &mut Lines) {
     }
     match (&found.resimulated, &found.no_resimulation) {
         (Some(again), _) => {
-            lines.put("re-run", format!("{}; {}", again.outcome, again.edge.reason));
+            lines.put("re-sim", format!("{}; {}", again.outcome, again.edge.reason));
             let grips: Vec<String> = again
                 .grips
                 .iter()
@@ -188,12 +188,12 @@ fn run_again(found: &Answer, lines: &mut Lines) {
                 })
                 .collect();
             if !grips.is_empty() {
-                lines.put("grips", format!("edge by factor on the grip: {}", grips.join(", ")));
+                lines.put("grips", format!("stability limit by factor on the grip: {}", grips.join(", ")));
             }
             lines.put("energy", again.energy.reason.clone());
         }
         (None, Some(why)) => {
-            lines.put("re-run", format!("not possible: {why}"));
+            lines.put("re-sim", format!("not possible: {why}"));
             lines.put("energy", found.recorded_energy.reason.clone());
         }
         _ => {}
@@ -205,7 +205,7 @@ fn felt(found: &Answer, lines: &mut Lines) {
     for t in &found.transparency {
         let mut parts = Vec::new();
         if let Some(i) = &t.impedance {
-            parts.push(format!("impedance off by a factor of {:.2} over {:.0}-{:.0} Hz", i.error.exp(), i.band_hz[0], i.band_hz[1]));
+            parts.push(format!("impedance error: a factor of {:.2} over {:.0}-{:.0} Hz", i.error.exp(), i.band_hz[0], i.band_hz[1]));
         }
         if let Some(ratio) = t.induced_ratio {
             parts.push(format!("induced motion {:.0} % of the hand's", 100.0 * ratio));
@@ -214,7 +214,7 @@ fn felt(found: &Answer, lines: &mut Lines) {
             parts.push(format!("{:.1} % of it cancelled in the first 50 ms", 100.0 * c.quality));
         }
         if !parts.is_empty() {
-            lines.put("felt", format!("{}: {}", t.name, parts.join("; ")));
+            lines.put("hand", format!("{}: {}", t.name, parts.join("; ")));
         }
     }
 }

@@ -41,7 +41,7 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
             Some(out.as_path())
         }
         (Some(out), None) => {
-            output::note(format_args!("{}: not written, for the master does what the graph says", out.display()));
+            output::note(format_args!("{}: not written, because the master behaves as the graph states", out.display()));
             None
         }
         (None, _) => None,

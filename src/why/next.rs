@@ -45,9 +45,10 @@ pub fn next(found: &Answer, asked: &Asked) -> Vec<Step> {
             [run, Builder::verb("stability").reads_later(&bag).build()]
         });
         let text = if found.remedies.is_empty() && !found.reproduced {
-            "The loop does not shake when it is run again with the models in the bag, so no remedy could be tried. Put right what differs, or record the loop with a dither and measure its stability limit."
+            "The re-simulation with the models in the bag does not oscillate, so no remedy could be tried. Correct the differences, or \
+                record the loop with a dither and measure its stability limit."
         } else {
-            "None of the remedies that were tried stops it in the re-simulation. Record the loop with a dither and measure its stability limit."
+            "None of the tried remedies stabilises the re-simulation. Record the loop with a dither and measure its stability limit."
         };
         steps.push(Step::new(text, dithered.into_iter().flatten()));
     }
@@ -121,7 +122,7 @@ fn changes(words: &[String]) -> Option<Overrides> {
 
 fn sentence(remedy: &Remedy) -> String {
     let hands = match remedy.robust {
-        true => "also with a grip 15 % softer or firmer and a gain a quarter higher",
+        true => "also with a grip 15 % softer or stiffer and with 25 % more gain",
         false => "with this grip and this gain only",
     };
     let throws = remedy.throws.as_ref().map_or_else(String::new, |throw| format!("; {throw}"));

@@ -21,12 +21,12 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
     };
     line("happens", &answer.happens);
     if let Some(beneath) = &answer.beneath {
-        line("beneath", &format!("without that limit: {beneath}"));
+        line("otherwise", &format!("without that limit: {beneath}"));
     }
     match answer.edge {
-        Some(edge) => line("gain", &format!("mu*lambda = {:.3}; the loop as it was is stable up to {edge:.3}", answer.gain)),
-        None if answer.not_again.is_some() => line("gain", &format!("mu*lambda = {:.3}; where its edge lies is not known", answer.gain)),
-        None => line("gain", &format!("mu*lambda = {:.3}; no edge within a factor of 20", answer.gain)),
+        Some(edge) => line("gain", &format!("mu*lambda = {:.3}; the loop as recorded is stable up to {edge:.3}", answer.gain)),
+        None if answer.not_again.is_some() => line("gain", &format!("mu*lambda = {:.3}; its stability limit is not known", answer.gain)),
+        None => line("gain", &format!("mu*lambda = {:.3}; no stability limit within a factor of 20", answer.gain)),
     }
     for (number, cause) in answer.causes.iter().filter(|c| c.confidence >= UNLIKELY).take(SHOWN).enumerate() {
         line(if number == 0 { "cause" } else { "or" }, &of_cause(cause));
@@ -40,16 +40,16 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
     if let Some(again) = &answer.again {
         let judged = !matches!(answer.happening, Happening::NotJudged { .. });
         let agrees = if !judged {
-            "and of the recording that is not known"
+            "which cannot be compared with the recording"
         } else if answer.reproduced {
             "as recorded"
         } else {
-            "which is NOT what was recorded: something is not known"
+            "which is NOT what was recorded: a cause is unknown"
         };
-        line("run again", &format!("{again}, {agrees}"));
+        line("simulated", &format!("{again}, {agrees}"));
     }
     if let Some(why) = &answer.not_again {
-        line("run again", &format!("not: {why}"));
+        line("simulated", &format!("not: {why}"));
     }
     for note in &answer.notes {
         line("note", note);

@@ -74,7 +74,7 @@ impl Asked {
         if let Some(roles) = &options.roles {
             if *changes != Overrides::default() {
                 return Err(AskedError(format!(
-                    "{}: holds no graph, so no part of it can be exchanged; leave the part's option out",
+                    "{}: contains no graph, so no part of it can be exchanged; omit the option",
                     path.display()
                 )));
             }
@@ -86,7 +86,7 @@ impl Asked {
             return Err(AskedError(which_bag(path)));
         }
         let reader = Reader::open(path).map_err(wrong)?;
-        let hint = if reader.without_messages().is_some() { "" } else { "; a bag that we did not record needs --roles FILE" };
+        let hint = if reader.without_messages().is_some() { "" } else { "; a bag that backdrive did not record needs --roles FILE" };
         let recorded = graph_of(&reader, &Overrides::default()).map_err(|e| AskedError(format!("{e}{hint}")))?;
         let graph = graph_of(&reader, changes).map_err(wrong)?;
         let mut session = Session::from_bag(&reader, &recorded).map_err(wrong)?;
@@ -96,8 +96,8 @@ impl Asked {
                 Ok(found) => {
                     let worst = |values: &[f64]| values.iter().fold(0.0_f64, |a, b| a.max(*b));
                     session.notes.push(format!(
-                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of x_m's range; \
-                         dry friction hides where it was within {:.2} mm",
+                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of \
+                         x_m's range. Dry friction makes its position uncertain by {:.2} mm",
                         100.0 * worst(&found.residual),
                         1e3 * worst(&found.ambiguity)
                     ));
@@ -127,7 +127,7 @@ impl Asked {
         }
         if is_coupled(&self.session) && (options.gain.is_some() || options.mu.is_some() || options.lambda.is_some()) {
             return Err(AskedError(format!(
-                "{}: two motors that are coupled have no mu*lambda, and are judged at the gains of the recording; leave --gain, --mu and --lambda out",
+                "{}: two coupled motors have no mu*lambda and are judged at the gains of the recording; omit --gain, --mu and --lambda",
                 options.recording.display()
             )));
         }
@@ -140,14 +140,15 @@ impl Asked {
         };
         if gain.product() <= 0.0 {
             return Err(AskedError(format!(
-                "{}: was recorded at mu*lambda = {}; say with --gain which gain is asked about",
+                "{}: was recorded at mu*lambda = {}; name the gain to judge with --gain",
                 options.recording.display(),
                 gain.product()
             )));
         }
         if !(SENSIBLE[0]..=SENSIBLE[1]).contains(&gain.product()) {
             return Err(AskedError(format!(
-                "mu*lambda = {:e} is beyond any sense: gains from {:e} to {:e} can be asked about, and edges are looked for from {:e} to {}",
+                "mu*lambda = {:e} is out of range: gains from {:e} to {:e} are accepted, and stability limits are searched for from {:e} \
+                    to {}",
                 gain.product(),
                 SENSIBLE[0],
                 SENSIBLE[1],
@@ -194,8 +195,8 @@ pub fn curve(
     hear: &(dyn Fn(usize) + Sync),
     cancel: &AtomicBool,
 ) -> Result<Vec<Option<(f64, Run)>>, AskedError> {
-    let no = |why: &str| AskedError(format!("{}: a sweep runs the loop again, and {why}", question.session.name));
-    let graph = question.asked.ok_or_else(|| no("this bag holds no models"))?;
+    let no = |why: &str| AskedError(format!("{}: a sweep re-simulates the loop, but {why}", question.session.name));
+    let graph = question.asked.ok_or_else(|| no("this bag contains no models"))?;
     if question.intents.is_none() && question.script.is_none() {
         return Err(no("its hand was not recorded and could not be recovered; name one with --script"));
     }

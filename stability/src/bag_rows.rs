@@ -144,7 +144,7 @@ impl Rows {
             }
         }
         if !reader.ended_cleanly() {
-            notes.push("the bag was cut off; what it holds is used".to_owned());
+            notes.push("the bag was cut off; its remaining content is used".to_owned());
         }
 
         let dense = || wanted.iter().zip(&self.heard).filter(|((_, role), _)| *role != SignalRole::Force);
@@ -282,7 +282,7 @@ fn drop_silent(axis: &mut AxisSignals, notes: &mut Vec<String>) {
         axis.slave = None;
     }
     if axis.dither.as_ref().is_some_and(|d| d.iter().all(|x| x.is_nan() || *x == 0.0)) {
-        notes.push(format!("axis {}: the dither is 0 throughout", axis.name));
+        notes.push(format!("axis {}: the dither is always 0", axis.name));
         axis.dither = None;
     }
 }
@@ -304,7 +304,7 @@ fn note_holes(topic: &str, role: SignalRole, heard: &Heard, rows: usize, notes: 
 fn gain_rows(graph: &Graph, first: u64, rows: usize, told: &mut [(u64, f64, f64)], notes: &mut Vec<String>) -> (Vec<f64>, Vec<f64>) {
     told.sort_by_key(|t| t.0); // stable: of two at one step the later counts
     if told.is_empty() {
-        notes.push("the gains are the graph's plan: the bag has no message of those in force".to_owned());
+        notes.push("the gains are those planned in the graph: the bag has no message with the actual gains".to_owned());
     }
     let period_s = graph.period_s();
     // The scaling's own core follows the plan, so that both ramp alike.
@@ -334,7 +334,7 @@ fn gain_rows(graph: &Graph, first: u64, rows: usize, told: &mut [(u64, f64, f64)
     let products = || mu.iter().zip(&lambda).map(|(m, l)| m * l);
     let (low, high) = products().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), g| (a.min(g), b.max(g)));
     if high - low > 1e-9 * high.abs() {
-        notes.push(format!("mu*lambda runs from {low:.4} to {high:.4}: each answer is of a piece at one gain"));
+        notes.push(format!("mu*lambda changes from {low:.4} to {high:.4}: each answer uses a part at one gain"));
     }
     (mu, lambda)
 }

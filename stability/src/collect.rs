@@ -291,11 +291,9 @@ impl Collector {
         match self.has {
             HasLoop::No => Some("the graph has no master, slave and coupling between them that could form one"),
             HasLoop::OnlyIfTouched | HasLoop::Yes if one_way => {
-                Some("lambda is 0: no force comes back to the hand, so there is no force feedback that could be unstable")
+                Some("lambda is 0: no force is reflected to the hand, so there is no force feedback that could be unstable")
             }
-            HasLoop::OnlyIfTouched if !touched() => {
-                Some("the slave has nothing to touch, and this law reflects nothing but the force of contact")
-            }
+            HasLoop::OnlyIfTouched if !touched() => Some("the slave has no environment, and this law reflects only the contact force"),
             HasLoop::OnlyIfTouched | HasLoop::Yes => None,
         }
     }

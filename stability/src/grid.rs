@@ -86,7 +86,7 @@ impl Grid {
         let last = signals.iter().filter_map(|s| s.times.last()).min().copied();
         let (Some(first), Some(last)) = (first, last) else { return Err("no signal has a value".to_owned()) };
         if last <= first {
-            return Err("the signals have no time in common".to_owned());
+            return Err("the signals do not overlap in time".to_owned());
         }
         let frequent = signals.iter().filter(|s| s.interval > 0).min_by_key(|s| s.interval);
         let period = match (rate_hz, frequent) {
@@ -101,7 +101,7 @@ impl Grid {
         };
         let rows = (((last - start) as f64 + 1.0) / period).floor() + 1.0;
         if rows < 16.0 {
-            return Err(format!("the signals have {:.3} s in common: too little", (last - first) as f64 * 1e-9));
+            return Err(format!("the signals overlap for only {:.3} s", (last - first) as f64 * 1e-9));
         }
         if rows > MOST_ROWS {
             return Err(format!("{rows} rows are more than {MOST_ROWS}; lower resample.rate_hz"));

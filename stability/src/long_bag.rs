@@ -70,13 +70,13 @@ pub(crate) fn read(reader: &Reader, graph: &Graph, place: &Place, most: u64) -> 
     let seconds = |steps: u64| steps as f64 * session.period_s;
     let from = (chosen * most).max(first);
     session.notes.push(format!(
-        "{:.0} s are more than is judged at once: what the recording did is told of all of it, in {} pieces; frequency response, models and the loop run again \
-         are of {:.0} s to {:.0} s, {}",
+        "the recording of {:.0} s is too long to analyse at once: its motion is judged in {} parts. Frequency response, models and \
+         re-simulation use {:.0} s to {:.0} s, {}",
         seconds(rows as u64),
         pieces.found.len(),
         seconds(from - first),
         seconds(from - first) + session.len() as f64 * session.period_s,
-        if worst <= Outcome::Stable.rank() { "the first piece that tells most" } else { "the first of those that did worst" }
+        if worst <= Outcome::Stable.rank() { "the first part with the most information" } else { "the first of the least stable parts" }
     ));
     session.elsewhere = outcome;
     session.cut_short = cut_short;

@@ -45,7 +45,7 @@ const LINEAR_SUBSTEPS: usize = 8;
 pub(crate) fn run_master(session: &Session, graph: &Graph, wanted: Wanted) -> Result<MasterRun, String> {
     let node = graph.node_of(NodeKind::Master).ok_or("the graph has no master node")?;
     let Settings::Master(files) = &node.settings else { return Err("the graph's master has no settings".to_owned()) };
-    let model = files.model.as_ref().ok_or_else(|| format!("node \"{}\" has no model: it is a program of its own", node.name))?;
+    let model = files.model.as_ref().ok_or_else(|| format!("node \"{}\" has no model: it is an external program", node.name))?;
     let linear = |e: &backdrive_plant::model::Element| matches!(e.law.role(), Role::Linear(_));
     let fragment = files.fragment.as_ref();
     let all_linear = model.elements.iter().chain(fragment.iter().flat_map(|f| &f.network.elements)).all(linear);
@@ -84,7 +84,7 @@ pub(crate) fn run_master(session: &Session, graph: &Graph, wanted: Wanted) -> Re
             device.step(&force[..axes], &hand[..axes]);
         }
         if !device.is_finite() {
-            return Err(format!("the model leaves all bounds at {:.3} s", row as f64 * session.period_s));
+            return Err(format!("the model diverges at {:.3} s", row as f64 * session.period_s));
         }
         for (axis, position) in run.position.iter_mut().enumerate() {
             position.push(device.measured(axis));

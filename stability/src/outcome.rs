@@ -201,7 +201,7 @@ impl std::fmt::Display for Outcome {
                 let travel = if *beyond_travel { "; the master left its travel" } else { "" };
                 write!(f, "limited: a clamp acted in {:.1} % of the contact{travel}", clamped_share * 100.0)
             }
-            Outcome::NotJudged { why } => write!(f, "it cannot be told whether it is stable: {why}"),
+            Outcome::NotJudged { why } => write!(f, "stability not known: {why}"),
         }
     }
 }

@@ -45,20 +45,20 @@ impl std::fmt::Display for PartCheck {
 impl PartCheck {
     fn said(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.silent > 0 {
-            return write!(f, "the {} of {} was recorded as no number in {} steps", self.quantity, self.part, self.silent);
+            return write!(f, "the {} of {} was recorded as NaN in {} steps", self.quantity, self.part, self.silent);
         }
         let share = 100.0 * self.error_rms / self.effect_rms.max(f64::MIN_POSITIVE);
         match self.part {
-            "master" => write!(f, "the master's model misses {share:.1} % of the motion that the reflected force makes"),
+            "master" => write!(f, "the master's model does not explain {share:.1} % of the motion induced by the reflected force"),
             "master's motor" => {
-                write!(f, "{share:.1} % of the force applied to the master is not what its model makes of the force command")
+                write!(f, "{share:.1} % of the force applied to the master does not follow from the force command by its model")
             }
-            "handle's motion" => write!(f, "the master's model misses {share:.1} % of the motion of what the hand holds"),
-            "master's motion" => write!(f, "the master's model misses {share:.1} % of its motion"),
-            "slave's motion" => write!(f, "the slave's model misses {share:.1} % of its motion"),
-            "slave's force" => write!(f, "the slave's model misses {share:.1} % of its force"),
-            "slave" => write!(f, "the slave's model misses {share:.1} % of the contact force"),
-            _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force as late as the graph says"),
+            "handle's motion" => write!(f, "the master's model does not explain {share:.1} % of the motion of the held body"),
+            "master's motion" => write!(f, "the master's model does not explain {share:.1} % of its motion"),
+            "slave's motion" => write!(f, "the slave's model does not explain {share:.1} % of its motion"),
+            "slave's force" => write!(f, "the slave's model does not explain {share:.1} % of its force"),
+            "slave" => write!(f, "the slave's model does not explain {share:.1} % of the contact force"),
+            _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force with the delay of the graph"),
         }
     }
 }

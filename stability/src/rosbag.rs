@@ -50,7 +50,7 @@ fn of_folder(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
         let mut files: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).filter(|p| has_ending(p, "mcap")).collect();
         files.sort();
         if files.is_empty() {
-            return Err(storage("holds neither a metadata.yaml nor an .mcap file: is it a rosbag2 folder?".to_owned()));
+            return Err(storage("contains neither a metadata.yaml nor an .mcap file: is it a rosbag2 folder?".to_owned()));
         }
         return Ok(files);
     }

@@ -89,16 +89,16 @@ impl std::fmt::Display for SensorFault {
         let signal = &self.signal;
         match &self.fault {
             Fault::Constant { value } => {
-                write!(f, "{signal} is dead: it is {value} throughout (a rail, a cable, or a channel that nobody uses)")
+                write!(f, "{signal} is dead: it is constant at {value} (saturation, cable, or an unused channel)")
             }
             Fault::WithinResolution { value, range } => {
                 write!(f, "{signal} is dead: it stays at {value:.6} within {range:.2e}, the resolution of its converter")
             }
             Fault::Clipped { at, share } => {
-                write!(f, "{signal} is clipped: {:.1} % of its samples stand at {at:.6}, where it stops dead each time", 100.0 * share)
+                write!(f, "{signal} is clipped: {:.1} % of its samples are at {at:.6}, where it stops abruptly each time", 100.0 * share)
             }
             Fault::DoesNotFollow { twin, explains } => {
-                write!(f, "{signal} does not follow {twin}, which measures the same: it explains {:.1} % of it", 100.0 * explains)
+                write!(f, "{signal} does not follow {twin}, which measures the same quantity: it explains {:.1} % of it", 100.0 * explains)
             }
         }
     }

@@ -83,17 +83,17 @@ impl SignalRole {
     /// What cannot be determined where it is missing.
     pub(crate) fn without(self) -> &'static str {
         match self {
-            SignalRole::Master => "neither the induced motion nor the loop can be told, nor whether the master oscillates",
-            SignalRole::Force => "neither how the master answers a force nor the loop can be told",
-            SignalRole::Command => "neither how the slave answers a command nor the loop can be told",
-            SignalRole::Contact => "neither what the slave touches nor the loop can be told",
-            SignalRole::Slave => "the environment's impedance is told against the command in place of the slave's motion",
-            SignalRole::Dither => "the master's answer to a force can be told against a recorded operator only",
-            SignalRole::Intent => "the loop cannot be run again with this hand, and rest is told by the signals alone",
-            SignalRole::Induced => "what was cancelled is not known from the record",
-            SignalRole::SlaveForce => "the law that couples the two motors cannot be told",
+            SignalRole::Master => "the induced motion, the loop and oscillations of the master cannot be identified",
+            SignalRole::Force => "the response of the master to a force, and the loop, cannot be identified",
+            SignalRole::Command => "the response of the slave to a command, and the loop, cannot be identified",
+            SignalRole::Contact => "contact and the loop cannot be identified",
+            SignalRole::Slave => "the environment's impedance is computed from the command instead of the slave's motion",
+            SignalRole::Dither => "the master's response to a force can be identified only with a recorded operator",
+            SignalRole::Intent => "the loop cannot be re-simulated with this hand, and rest is detected from the signals alone",
+            SignalRole::Induced => "the cancelled motion is not known from the record",
+            SignalRole::SlaveForce => "the law that couples the two motors cannot be identified",
             SignalRole::Sensor => "its faults are not known",
-            SignalRole::Hand => "a coupling that carries the hand's force to the slave cannot be told",
+            SignalRole::Hand => "a coupling that transmits the hand's force to the slave cannot be identified",
         }
     }
 }

@@ -63,10 +63,10 @@ pub enum SummaryError {
 pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, SummaryError> {
     let path = reader.path();
     let no_graph = |why: String| SummaryError::NoGraph { path: path.to_path_buf(), why };
-    let not_begun = || reader.without_messages().map_or("is not a bag of a run: it holds no graph".to_string(), |cut| cut.to_string());
+    let not_begun = || reader.without_messages().map_or("is not a bag of a run: it contains no graph".to_string(), |cut| cut.to_string());
     let header = reader.header().ok_or_else(|| no_graph(not_begun()))?;
     if header.graph_toml.is_empty() {
-        return Err(no_graph("holds recordings, but no graph to run".to_string()));
+        return Err(no_graph("contains recordings, but no graph to run".to_string()));
     }
     Ok(Graph::from_text(&header.graph_toml, path, changes, &Files::Bag(&header.files))?)
 }
@@ -145,13 +145,13 @@ impl Margins {
         let at = |margin: &Margin| format!("{}, at {:.1} s", of(margin), margin.step as f64 * period_s);
         match (&self.last, &self.lowest, &self.unknown) {
             (Some(last), Some(lowest), _) if lowest.step != last.step => {
-                format!("{} (the last that was known); lowest {}{}", at(last), at(lowest), AT_AMPLITUDE)
+                format!("{} (last known value); lowest {}{}", at(last), at(lowest), AT_AMPLITUDE)
             }
-            (Some(last), ..) => format!("{} (the last that was known){AT_AMPLITUDE}", at(last)),
+            (Some(last), ..) => format!("{} (last known value){AT_AMPLITUDE}", at(last)),
             (None, _, Some(unknown)) if unknown.known == known::NO_DITHER => {
                 "not known: it is measured by a dither on the force channel, and this run has none (--dither adds one)".to_string()
             }
-            (None, _, Some(unknown)) => format!("{} throughout", of(unknown)),
+            (None, _, Some(unknown)) => format!("always {}", of(unknown)),
             (None, _, None) => "not known: no node reported one".to_string(),
         }
     }

@@ -94,13 +94,13 @@ pub fn transparency(session: &Session, graph: Option<&Graph>) -> Vec<Transparenc
         let mut found = tracking(session, axis);
         match impedance(session, axis) {
             Ok(impedance) => found.impedance = Some(impedance),
-            Err(why) => found.notes.push(format!("the transmitted impedance cannot be told: {why}")),
+            Err(why) => found.notes.push(format!("the transmitted impedance is not known: {why}")),
         }
         match &runs {
-            Err(why) => found.notes.push(format!("the induced motion cannot be told: {why}")),
+            Err(why) => found.notes.push(format!("the induced motion is not known: {why}")),
             Ok((with, without)) => match (with.position.get(index), without.position.get(index)) {
                 (Some(with), Some(without)) => induced(session, axis, with, without, &mut found),
-                _ => found.notes.push("the induced motion cannot be told: the master's model has no such axis".to_owned()),
+                _ => found.notes.push("the induced motion is not known: the master's model has no such axis".to_owned()),
             },
         }
         found
@@ -138,10 +138,10 @@ fn tracking(session: &Session, axis: &AxisSignals) -> Transparency {
         ..Transparency::default()
     };
     if axis.slave.is_none() {
-        found.notes.push("x_s was not recorded: positions are held against the command x_c".to_owned());
+        found.notes.push("x_s was not recorded: positions are compared with the command x_c".to_owned());
     }
     if contact.is_empty() {
-        found.notes.push("nothing was touched".to_owned());
+        found.notes.push("there was no contact".to_owned());
     }
     found
 }
@@ -157,7 +157,7 @@ fn induced(session: &Session, axis: &AxisSignals, with: &[f64], without: &[f64],
     }
     let Some(first) = touching.first().map(|r| r.start) else { return };
     let Some(predicted) = &axis.induced else {
-        found.notes.push("nothing was cancelled, or what was cancelled was not recorded".to_owned());
+        found.notes.push("nothing was cancelled, or the cancelled motion was not recorded".to_owned());
         return;
     };
     let rows = (WINDOW_S / session.period_s).round() as usize;
@@ -192,7 +192,7 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
         (None, None) => return Err("neither a dither nor the operator's intent was recorded".to_owned()),
     };
     if pieces.is_empty() {
-        return Err(if against == "dither" { "the hand never held still in contact" } else { "nothing was touched" }.to_owned());
+        return Err(if against == "dither" { "the hand never held still in contact" } else { "there was no contact" }.to_owned());
     }
     let tip = axis.slave.as_ref().unwrap_or(&axis.command);
     let force: Vec<f64> = (0..session.len()).map(|row| reflected(axis, row)).collect();
@@ -212,10 +212,10 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
         length = length * 3 / 4;
     }
     if length < 16 {
-        return Err("contact at one gain and without lost rows is too short".to_owned());
+        return Err("the contact at one gain without lost rows is too short".to_owned());
     }
     let gain = pieces.first().and_then(|p| gains().nth(p.start)).unwrap_or(f64::NAN);
-    let nothing = || "no segment is whole".to_owned();
+    let nothing = || "no segment is complete".to_owned();
     let spectra = welch(&columns, &pieces, length, period_s, 0.5 / period_s).ok_or_else(nothing)?;
     let power = |line: usize| spectra.lines.get(line).map_or(0.0, |s| s[(0, 0)].re);
     let peak = (0..spectra.lines.len()).map(power).fold(0.0, f64::max);
@@ -264,10 +264,10 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
     let (Some(low), Some(high)) = (found.frequency_hz.first().copied(), found.frequency_hz.last().copied()) else {
         let [force, master, contact, tip] = best.1;
         // A canceller that is right keeps the dither from the slave.
-        let why = if against == "dither" && contact < master { "; what is cancelled never reaches the slave" } else { "" };
+        let why = if against == "dither" && contact < master { "; the cancelled motion never reaches the slave" } else { "" };
         return Err(format!(
-            "at no frequency do forces and motions all cohere with the {against} to {LEAST_COHERENCE}; at the best F_f {force:.2}, x_m \
-             {master:.2}, F_s {contact:.2}, x_s {tip:.2}{why}"
+            "at no frequency are all forces and motions coherent with the {against} (at least {LEAST_COHERENCE}); best: F_f {force:.2}, \
+             x_m {master:.2}, F_s {contact:.2}, x_s {tip:.2}{why}"
         ));
     };
     found.band_hz = [low, high];

@@ -53,26 +53,27 @@ impl Unjudged {
         match self {
             Unjudged::Empty => "Record the master's measured topic and the slave's, whose effort is the contact force.",
             Unjudged::NoContact => {
-                "Record a push: let the hand bring the slave against what it shall touch and hold still there for a second (launch/contact.toml \
+                "Record a push: let the hand press the slave against its environment and hold still for a second (launch/contact.toml \
                  does), or make the run longer."
             }
-            Unjudged::NoFeedback => "Ask at a gain above 0 (`backdrive stability BAG --gain 0.3`), or run with --lambda above 0.",
+            Unjudged::NoFeedback => "Judge a gain above 0 (`backdrive stability BAG --gain 0.3`), or run with --lambda above 0.",
             Unjudged::NoHold => {
-                "Let the hand hold still while the loop is closed (in contact, where only contact closes it) for a second or two: half a second at \
-                 least, and 16 steps beyond the first 0.15 s."
+                "Let the hand hold still while the loop is closed (in contact, where only contact closes it) for one or two seconds. The \
+                 minimum is 0.5 s, and 16 steps after the first 0.15 s."
             }
-            Unjudged::NotShaken => "Move faster, turn round sharply and touch something, so that the pair is stirred above 8 Hz.",
+            Unjudged::NotShaken => "Move faster, reverse sharply and touch something, to excite the pair above 8 Hz.",
             Unjudged::NoDecay => "Record longer, with more sharp contacts: ten seconds or more.",
             Unjudged::Gaps { .. } => {
-                "Record again with every node running and nothing lost; `backdrive doctor` tells what of this machine delays messages."
+                "Record again with every node running and nothing lost; `backdrive doctor` reports what delays messages on this machine."
             }
             Unjudged::CutShort { .. } => "Let the run go to its end, or ask for a shorter one with --duration.",
             Unjudged::NotClosed => {
-                "Record again and let the run end by itself or by Ctrl-C; `backdrive bag recover` makes a clean copy of what there is, but does not \
-                 make it whole."
+                "Record again and let the run end normally or by Ctrl-C; `backdrive bag recover` makes a clean copy of the available \
+                 data, but does not restore what is missing."
             }
             Unjudged::Contradictory => {
-                "Find out what changed the bag: the notes name topic, factor and time. `backdrive bag info --check` counts its messages; else record again."
+                "Find out what changed the bag: the notes give topic, factor and time. Count its messages with `backdrive bag info \
+                    --check`, or record again."
             }
             Unjudged::ModelsApart => "Find out with `backdrive why` or `backdrive diagnose` what its models leave out.",
             Unjudged::NodeDied => "Find out why the node ended (above), and run again.",
@@ -90,21 +91,21 @@ impl Unjudged {
 impl std::fmt::Display for Unjudged {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Unjudged::Empty => write!(f, "there is no sample of the master and of what the slave touches together"),
-            Unjudged::NoContact => write!(f, "the slave never touched anything, so the loop was never closed"),
-            Unjudged::NoFeedback => write!(f, "lambda is 0: no force comes back to the hand, so there is no loop that could be unstable"),
+            Unjudged::Empty => write!(f, "the master and the contact force were never sampled at the same time"),
+            Unjudged::NoContact => write!(f, "the slave was never in contact, so the loop was never closed"),
+            Unjudged::NoFeedback => write!(f, "lambda is 0: no force is reflected to the hand, so there is no loop that could be unstable"),
             Unjudged::NoHold => write!(f, "the loop was closed, but never while the hand held still for 0.45 s and 16 steps"),
-            Unjudged::NotShaken => write!(f, "nothing stirs the pair above 8 Hz, so nothing shows that an oscillation dies"),
+            Unjudged::NotShaken => write!(f, "nothing excites the pair above 8 Hz, so it is not shown that oscillations decay"),
             Unjudged::NoDecay => {
-                write!(f, "how fast the slowest oscillation of the pair dies is not known well enough to say that it does")
+                write!(f, "the decay rate of the least damped oscillation is too uncertain to show that it decays")
             }
             Unjudged::Gaps { steps, of } => {
-                write!(f, "{steps} of {of} steps have no fresh sample of every signal of the loop, so it was open or is not known there")
+                write!(f, "{steps} of {of} steps lack a new sample of some signal of the loop, so the loop was open or unknown there")
             }
-            Unjudged::CutShort { steps, of } => write!(f, "it ends after {steps} of the {of} steps that the graph asks for"),
-            Unjudged::NotClosed => write!(f, "the bag was cut off, and how much is missing behind its end is not known"),
-            Unjudged::Contradictory => write!(f, "what was recorded contradicts itself or its graph (see the notes)"),
-            Unjudged::ModelsApart => write!(f, "the models in the bag do not do what was recorded"),
+            Unjudged::CutShort { steps, of } => write!(f, "it ends after {steps} of the {of} steps of the graph"),
+            Unjudged::NotClosed => write!(f, "the bag was cut off, and it is not known how much is missing at its end"),
+            Unjudged::Contradictory => write!(f, "the recording contradicts itself or its graph (see the notes)"),
+            Unjudged::ModelsApart => write!(f, "the models in the bag do not reproduce the recording"),
             Unjudged::NodeDied => write!(f, "a node died while it ran"),
             Unjudged::Lost { messages } => write!(f, "{messages} messages were lost"),
         }

@@ -47,7 +47,7 @@ struct Machine {
     is_quick: bool,
 }
 
-/// How a recording tells its time.
+/// The time source of a recording.
 enum Time {
     /// A column, s.
     Column(&'static str),

@@ -75,7 +75,7 @@ impl Record {
     pub fn of_bag(path: &Path) -> Result<Record, BenchError> {
         let reader = Reader::open(path)?;
         let wrong = |what: String| BenchError::NoBench { path: path.display().to_string(), what };
-        let header = reader.header().ok_or_else(|| wrong("holds no graph".to_string()))?;
+        let header = reader.header().ok_or_else(|| wrong("contains no graph".to_string()))?;
         let graph = Graph::from_text(&header.graph_toml, path, &Overrides::default(), &Files::Bag(&header.files))?;
         let node = |kind: NodeKind| graph.nodes.iter().position(|n| n.kind == kind);
         let need = |kind: NodeKind| node(kind).ok_or_else(|| wrong(format!("its graph has no {} node", kind.name())));

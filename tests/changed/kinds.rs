@@ -124,7 +124,7 @@ pub const KINDS: &[Kind] = &[
         bag.attachments.remove(at);
         Some(Costs::Itself)
     }),
-    ("two messages of one number", |bag, _| {
+    ("two different messages with one sequence number", |bag, _| {
         let at = bag.messages.iter().position(|m| m.topic == "/master/measured_js" && m.header.sequence == 50)?;
         let mut other = bag.messages[at].clone();
         let last = other.data.len() - 1;

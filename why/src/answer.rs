@@ -132,7 +132,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         notes: session.notes.iter().cloned().chain(notes).collect(),
     };
     if contradictory {
-        answer.not_again = Some("what was recorded contradicts itself or its graph".to_string());
+        answer.not_again = Some("the recording contradicts itself or its graph".to_string());
         of_events(&mut answer, recorded);
         return Ok(answer);
     }
@@ -211,13 +211,13 @@ fn closer(
 fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {
     let Question { session, graph, gain, .. } = question;
     if gain.product() == 0.0 {
-        answer.not_again = Some("mu*lambda is 0, so there is no loop to run without one thing or another".to_string());
+        answer.not_again = Some("mu*lambda is 0, so there is no loop to re-simulate without the suspects".to_string());
         return Ok(());
     }
     let steps = session.len().min(MOST_STEPS) as u64;
     let hand = Hand { intents: question.intents.clone(), steps, rate_hz: graph.timing.rate_hz };
     let was: Trial = as_recorded(graph, &answer.differences);
-    hear("the loop as it was");
+    hear("the loop as recorded");
     let run = was.run(&hand, *gain, &RunOptions { keep_dither: true, keep_signals: true, ..RunOptions::default() }, cancel)?;
     answer.again_signals = run.signals;
     answer.again = Some(run.outcome.to_string());
@@ -280,7 +280,7 @@ fn of_events(answer: &mut Answer, recorded: &Recorded) {
         kind,
         place,
         evidence,
-        without: "not run again: it is no part of a model".to_string(),
+        without: "not re-simulated: it is not part of a model".to_string(),
         holds_without: false,
         edge_without: None,
         seen: true,
@@ -290,7 +290,7 @@ fn of_events(answer: &mut Answer, recorded: &Recorded) {
     let mut told = Vec::new();
     let twice = recorded.tracks.iter().filter(|t| t.sources.len() > 1);
     told.extend(
-        twice.map(|t| cause(CauseKind::TwoPublishers, t.topic.clone(), format!("{} publishers speak on {}", t.sources.len(), t.topic))),
+        twice.map(|t| cause(CauseKind::TwoPublishers, t.topic.clone(), format!("{} publishers send on {}", t.sources.len(), t.topic))),
     );
     if let Some(event) = recorded.events.iter().find(|e| e.kind == "connection_broken" && e.text.contains("another publisher")) {
         told.push(cause(CauseKind::TwoPublishers, event.topic.clone(), event.text.clone()));

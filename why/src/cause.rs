@@ -137,7 +137,7 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
         kind: CauseKind::Unknown,
         place,
         evidence,
-        without: "not known, for nothing in the bag models it".to_string(),
+        without: "not known, because no model in the bag contains it".to_string(),
         holds_without: false,
         edge_without: None,
         seen,
@@ -153,7 +153,7 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
         }
     }
     if all.is_empty() && asked.differences.is_empty() && !asked.shakes_again {
-        let evidence = "the graph's loop does not shake when it is run again, and every node does what the graph says".to_string();
+        let evidence = "the graph's loop does not oscillate in the re-simulation, and every node behaves as the graph states".to_string();
         all.push((cause(String::new(), evidence, false), 1.0));
     }
     all
@@ -170,8 +170,8 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         kind: CauseKind::GainTooHigh,
         place: String::new(),
         evidence: match lowered {
-            Some(edge) => format!("every node does what the graph says, and that loop is stable up to mu*lambda = {edge:.3} only"),
-            None => "the loop of the graph shakes at this gain".to_string(),
+            Some(edge) => format!("every node behaves as the graph states, and that loop is stable only up to mu*lambda = {edge:.3}"),
+            None => "the loop of the graph oscillates at this gain".to_string(),
         },
         without: lowered.map_or_else(|| "no lower gain was found stable".to_string(), |edge| format!("stable below {edge:.3}")),
         holds_without: lowered.is_some(),

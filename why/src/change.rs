@@ -189,40 +189,40 @@ impl Change {
 impl std::fmt::Display for Change {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Change::Gain { lambda, factor } => write!(f, "lower lambda to {lambda:.3} ({:.0} % of it)", 100.0 * factor),
+            Change::Gain { lambda, factor } => write!(f, "lower lambda to {lambda:.3} ({:.0} % of the recorded value)", 100.0 * factor),
             Change::Canceller { of, model: None, .. } => write!(f, "{of}"),
             Change::Canceller { of, high_pass_hz, .. } if *high_pass_hz > 0.0 => {
-                write!(f, "let the canceller predict with {of}, above {high_pass_hz:.1} Hz only (high_pass_hz)")
+                write!(f, "use {of} in the canceller, only above {high_pass_hz:.1} Hz (high_pass_hz)")
             }
             Change::EstimatedHand { .. } => {
-                write!(f, "let the canceller know the master's model and estimate the hand while it runs (hand = \"estimated\")")
+                write!(f, "give the canceller the master's model, and let it estimate the hand during the run (hand = \"estimated\")")
             }
-            Change::Canceller { of, .. } => write!(f, "let the canceller predict with {of}"),
+            Change::Canceller { of, .. } => write!(f, "use {of} in the canceller"),
             Change::HighPass { hz } if *hz > 0.0 => {
-                write!(f, "put the canceller's estimate through a high-pass of {hz:.1} Hz (high_pass_hz)")
+                write!(f, "filter the canceller's estimate with a high-pass of {hz:.1} Hz (high_pass_hz)")
             }
-            Change::HighPass { .. } => write!(f, "take the high-pass off the canceller's estimate (high_pass_hz = 0)"),
+            Change::HighPass { .. } => write!(f, "remove the high-pass from the canceller's estimate (high_pass_hz = 0)"),
             Change::WayRepaired { node, port } => {
-                write!(f, "repair the way to {node}.{port}: no more delay, jitter or loss than the graph says")
+                write!(f, "repair the connection to {node}.{port}: no more delay, jitter or loss than the graph states")
             }
-            Change::Delays { factor } if *factor == 0.0 => write!(f, "take out the delays, jitter and loss that the graph states"),
+            Change::Delays { factor } if *factor == 0.0 => write!(f, "remove the delays, jitter and loss that the graph states"),
             Change::Delays { factor } => {
-                write!(f, "bring delays, jitter and loss down to {:.0} % of what the graph states", 100.0 * factor)
+                write!(f, "reduce delays, jitter and loss to {:.0} % of what the graph states", 100.0 * factor)
             }
             Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
             Change::Coupling { law } => {
-                write!(f, "couple master and slave by {} in the place of scaling and canceller (--coupling {law})", law.replace('_', " "))
+                write!(f, "couple master and slave by {} instead of scaling and canceller (--coupling {law})", law.replace('_', " "))
             }
-            Change::FinerSensors => write!(f, "read the position with a finer sensor"),
+            Change::FinerSensors => write!(f, "use a position sensor with a finer resolution"),
             Change::FrictionCompensated { share } => {
-                write!(f, "let the master's motor make up for {:.0} % of its dry friction", 100.0 * share)
+                write!(f, "compensate {:.0} % of the master's dry friction with its motor", 100.0 * share)
             }
             Change::Damping { damping } => write!(f, "inject damping of {damping:.1} N s/m at the handle"),
-            Change::Grip { factor } if *factor > 1.0 => write!(f, "hold the handle {factor:.1} times as firmly"),
-            Change::Grip { factor } => write!(f, "hold the handle more softly, {factor:.1} times as firmly"),
+            Change::Grip { factor } if *factor > 1.0 => write!(f, "hold the handle with {factor:.1} times the grip stiffness"),
+            Change::Grip { factor } => write!(f, "hold the handle more softly, with {factor:.1} times the grip stiffness"),
             Change::Rate { hz } => write!(f, "run the loop at {hz:.0} Hz"),
-            Change::NoLimits => write!(f, "without any limit"),
-            Change::StrongerMotor => write!(f, "a motor of more force"),
+            Change::NoLimits => write!(f, "remove all limits"),
+            Change::StrongerMotor => write!(f, "use a stronger motor"),
         }
     }
 }

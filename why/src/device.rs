@@ -151,9 +151,9 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
     let left = 100.0 * best.left;
     let sentence = match best.physics.first() {
         Some(first) => {
-            format!("of what the model does otherwise, {} at {} leaves {left:.0} %", first.physics.replace('_', " "), first.place)
+            format!("of the difference to the model, {} at {} leaves {left:.0} %", first.physics.replace('_', " "), first.place)
         }
-        None => format!("other numbers leave {left:.0} % of what the model does otherwise, and no physics that was tried leaves less"),
+        None => format!("other parameters leave {left:.0} % of the difference to the model, and no tested effect leaves less"),
     };
     Some(DeviceFound {
         word: if best.physics.is_empty() { "unexplained" } else { "missing" }.to_string(),

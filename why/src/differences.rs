@@ -61,15 +61,15 @@ pub fn differences(
             continue;
         }
         if !is_known(&node.settings) {
-            all.notes.push(format!("{}: is a program of its own, so what it should have put out is not known", node.name));
+            all.notes.push(format!("{}: is an external program, so its correct output is not known", node.name));
             continue;
         }
-        hear(&format!("{} by itself", node.name));
+        hear(&format!("{} alone", node.name));
         of_node(graph, index, (recorded, look.small), &told, &mut all)?;
     }
     let is_master = |d: &Difference| d.kind == NodeKind::Master && d.quantity == Quantity::Position && may_be_the_device(&d.compared);
     if let Some(place) = all.found.iter().position(is_master) {
-        hear("the master, number by number");
+        hear("the master, parameter by parameter");
         let Difference { node, axis, compared, .. } = all.found[place].clone();
         // Ways that are late are part of what it was given.
         let ways: Vec<Difference> = all.found.iter().filter(|d| d.way.is_some()).cloned().collect();
@@ -79,7 +79,7 @@ pub fn differences(
         let number =
             wrong_number(&as_it_is, &node, axis, recorded, compared.share).filter(|(_, left)| !simple || *left < 0.5 * compared.left);
         let device = number.map(|(found, _)| found).or_else(|| {
-            (!simple && !look.patience.is_zero()).then(|| hear("the master, physics by physics"))?;
+            (!simple && !look.patience.is_zero()).then(|| hear("the master, effect by effect"))?;
             diagnose_master(&as_it_is, recorded, look.patience, stop)
         });
         for d in all.found.iter_mut().filter(|d| is_master(d)) {
@@ -124,7 +124,7 @@ fn of_node(
         for (_, port, quantity, input, exact) in told {
             let topic = graph.topic_of(index, port).name;
             let (Some(track), Some(predicted)) = (recorded.track(&topic), put.iter().find(|p| p.topic == topic)) else {
-                let note = format!("{topic} was not recorded, so {} cannot be looked at", node.name);
+                let note = format!("{topic} was not recorded, so {} cannot be checked", node.name);
                 if !all.notes.contains(&note) {
                     all.notes.push(note);
                 }

@@ -1,7 +1,7 @@
 //! What a sensor or a motor does that its model does not say, put around a node's core.
 
 use backdrive_control::core::{Core, Events, Port, Tick};
-use backdrive_control::live_margin::Told;
+use backdrive_control::live_margin::MarginEstimate;
 use backdrive_msgs::{Gains, Sample};
 use backdrive_stability::by_itself::recorded::Quantity;
 use serde::Serialize;
@@ -91,7 +91,7 @@ impl Core for Faulty {
         self.core.gains()
     }
 
-    fn margin(&self) -> Option<Told> {
+    fn margin(&self) -> Option<MarginEstimate> {
         self.core.margin()
     }
 }

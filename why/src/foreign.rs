@@ -32,11 +32,11 @@ pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
     causes.extend(dead);
     let differs = causes.iter().map(|(c, _)| c.evidence.clone()).collect();
     if let Some(edge) = edge.filter(|e| *e < gain.product()) {
-        let evidence = format!("by the measured frequency response the loop is stable up to mu*lambda = {edge:.3} only");
+        let evidence = format!("by the measured frequency response the loop is stable only up to mu*lambda = {edge:.3}");
         let holds = cause(CauseKind::GainTooHigh, String::new(), evidence, true);
         causes.push((Cause { without: format!("stable below {edge:.3}"), edge_without: Some(edge), ..holds }, 1.0));
     }
-    notes.push("no loop was run again: the recording holds no models".to_string());
+    notes.push("no loop was re-simulated: the recording contains no models".to_string());
     let remedies = match edge.filter(|_| happening.is_trouble()) {
         Some(edge) => vec![lower(gain, edge)],
         None => Vec::new(),
@@ -115,7 +115,7 @@ fn measured(session: &Session, gain: Gain) -> (Measured, Vec<String>) {
 }
 
 fn cause(kind: CauseKind, place: String, evidence: String, holds_without: bool) -> Cause {
-    let without = "not run again: no model of the loop is known".to_string();
+    let without = "not re-simulated: no model of the loop is known".to_string();
     Cause { kind, place, evidence, without, holds_without, edge_without: None, seen: true, confidence: 0.0, repairs: Vec::new() }
 }
 
@@ -137,19 +137,19 @@ fn of_axis(axis: &AxisSignals, session: &Session, gain: Gain, happening: &Happen
         let at = |kind: CauseKind, text: String| cause(kind, format!("axis {}", axis.name), text, false);
         match found.as_if {
             AsIf::Changed { gain, .. } if gain < 0.0 => {
-                all.push((at(CauseKind::WrongSign, format!("{what} goes against {of}: it is {gain:.2} times that")), 6.0));
+                all.push((at(CauseKind::WrongSign, format!("{what} has the opposite sign of {of}: it is {gain:.2} times that")), 6.0));
             }
             AsIf::Changed { late, .. } if late >= LEAST_LATE => {
                 let late_s = late as f64 * session.period_s;
                 // Of half a period of what oscillates, which is what it takes to turn a loop round.
                 let share = happening.frequency_hz().map_or(0.5, |hz| (2.0 * hz * late_s).min(3.0));
-                all.push((at(CauseKind::Delay, format!("{what} comes {:.1} ms after {of}", 1e3 * late_s)), share));
+                all.push((at(CauseKind::Delay, format!("{what} lags {of} by {:.1} ms", 1e3 * late_s)), share));
             }
             AsIf::Dead { from_row } => {
-                let text = format!("{what} stands still from {:.2} s on, while {of} moves", from_row as f64 * session.period_s);
+                let text = format!("{what} is constant from {:.2} s on, while {of} moves", from_row as f64 * session.period_s);
                 all.push((at(CauseKind::DeadSensor, text), 6.0));
             }
-            AsIf::Railed { .. } => all.push((at(CauseKind::Saturation, format!("{what} ends at a value beyond which {of} goes on")), 2.0)),
+            AsIf::Railed { .. } => all.push((at(CauseKind::Saturation, format!("{what} saturates, while {of} moves on")), 2.0)),
             AsIf::Unsteady { .. } | AsIf::Changed { .. } | AsIf::Stepped { .. } | AsIf::Noisy { .. } | AsIf::Same | AsIf::Otherwise => {}
         }
     }
@@ -163,7 +163,7 @@ fn lower(gain: Gain, edge: f64) -> Remedy {
     Remedy {
         text: change.to_string(),
         changes: vec![change],
-        outcome: format!("by the measured frequency response stable, a fifth below its edge at {edge:.3}"),
+        outcome: format!("stable by the measured frequency response, 20 % below its stability limit of {edge:.3}"),
         stops: true,
         robust: false,
         force_kept: factor,

@@ -141,26 +141,30 @@ impl Happening {
 impl std::fmt::Display for Happening {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Happening::Nothing => write!(f, "nothing shakes: what oscillates dies at once"),
+            Happening::Nothing => write!(f, "no oscillation: disturbances decay at once"),
             Happening::Ringing { frequency_hz, periods } => {
-                write!(f, "it rings at {frequency_hz:.0} Hz after a touch, and needs {periods:.0} periods to fall to a third")
+                write!(f, "it rings at {frequency_hz:.0} Hz after contact and needs {periods:.0} periods to decay to a third")
             }
             Happening::LimitCycle { amplitude_m, frequency_hz, unit } => {
                 write!(f, "a limit cycle of ±{} at {frequency_hz:.1} Hz", unit.text(*amplitude_m))
             }
             Happening::RunAway { growth_per_s, frequency_hz } if *frequency_hz > 0.0 => {
-                write!(f, "it runs away: an oscillation of {frequency_hz:.1} Hz grows by {growth_per_s:.2} per second")
+                write!(f, "unstable: an oscillation at {frequency_hz:.1} Hz grows by {growth_per_s:.2} per second")
             }
-            Happening::RunAway { growth_per_s, .. } => write!(f, "it runs away without oscillating, by {growth_per_s:.2} per second"),
+            Happening::RunAway { growth_per_s, .. } => write!(
+                f,
+                "unstable: the motion diverges without oscillating, by {growth_per_s:.2} \
+                per second"
+            ),
             Happening::Stairs { amplitude_m, frequency_hz, unit } => {
-                write!(f, "it creeps in stairs of stick and slip, ±{}, {frequency_hz:.1} a second", unit.text(*amplitude_m))
+                write!(f, "stick-slip of ±{}, {frequency_hz:.1} times a second", unit.text(*amplitude_m))
             }
             Happening::Saturation { clamped_share, beyond_travel } => {
                 let travel = if *beyond_travel { ", and the master leaves its travel" } else { "" };
                 write!(f, "a limit acts in {:.1} % of the contact{travel}", 100.0 * clamped_share)
             }
             Happening::NotJudged { why: why @ Unjudged::NoFeedback } => write!(f, "nothing to judge: {why}"),
-            Happening::NotJudged { why } => write!(f, "it cannot be told whether it shakes: {why}"),
+            Happening::NotJudged { why } => write!(f, "it is not known whether the loop oscillates: {why}"),
         }
     }
 }

@@ -24,19 +24,19 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
                 if missing > 0.3 && late == 0 { CauseKind::Loss } else { CauseKind::Delay },
                 place,
                 format!(
-                    "what comes to {node}.{port} is {:.1} to {:.1} ms later than the graph says, and {:.0} % never comes",
+                    "the input {node}.{port} arrives {:.1} to {:.1} ms later than the graph states, and {:.0} % is lost",
                     1e3 * late as f64 * period_s,
                     1e3 * (late + jitter) as f64 * period_s,
                     100.0 * missing
                 ),
             ),
             AsIf::Unsteady { late: 0, missing, .. } => {
-                (CauseKind::Loss, place, format!("{:.1} % of what {node}.{port} should get never comes", 100.0 * missing))
+                (CauseKind::Loss, place, format!("{:.1} % of the input {node}.{port} is lost", 100.0 * missing))
             }
             AsIf::Unsteady { late, .. } | AsIf::Changed { late, .. } => (
                 CauseKind::Delay,
                 place,
-                format!("what comes to {node}.{port} is {:.2} ms later than the graph says", 1e3 * late as f64 * period_s),
+                format!("the input {node}.{port} arrives {:.2} ms later than the graph states", 1e3 * late as f64 * period_s),
             ),
             _ => (CauseKind::Delay, place, String::new()),
         };
@@ -47,34 +47,34 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
     let place = node.clone();
     match difference.compared.as_if {
         AsIf::Dead { from_row } => {
-            (CauseKind::DeadSensor, place, format!("{what} at {node} stands still from {:.2} s on", from_row as f64 * period_s))
+            (CauseKind::DeadSensor, place, format!("{what} at {node} is constant from {:.2} s on", from_row as f64 * period_s))
         }
         AsIf::Railed { low, high } => {
             let end = if high.is_finite() { high } else { low };
-            (CauseKind::RailedSensor, place, format!("{what} at {node} ends at {end:.4}, where the model goes beyond"))
+            (CauseKind::RailedSensor, place, format!("{what} at {node} saturates at {end:.4}, which the model exceeds"))
         }
         AsIf::Stepped { step } => {
-            (CauseKind::CoarseSensor, place, format!("{what} at {node} comes in steps of {step:.3e}, which its model does not have"))
+            (CauseKind::CoarseSensor, place, format!("{what} at {node} has a resolution of {step:.3e}, which is not in its model"))
         }
         AsIf::Noisy { deviation } => {
-            (CauseKind::CoarseSensor, place, format!("{what} at {node} has noise of {deviation:.3e} rms, which its model does not have"))
+            (CauseKind::CoarseSensor, place, format!("{what} at {node} has noise of {deviation:.3e} rms, which is not in its model"))
         }
         AsIf::Changed { gain, late: 0 } if gain < 0.0 => {
-            (CauseKind::WrongSign, place, format!("{what} at {node} is {gain:.2} times what the model says: its sign is turned round"))
+            (CauseKind::WrongSign, place, format!("{what} at {node} is {gain:.2} times the model's value: its sign is wrong"))
         }
         AsIf::Changed { gain, late: 0 } => {
-            (CauseKind::ScaledSensor, place, format!("{what} at {node} is {gain:.3} times what the model says"))
+            (CauseKind::ScaledSensor, place, format!("{what} at {node} is {gain:.3} times the model's value"))
         }
         AsIf::Changed { gain, late } if (gain - 1.0).abs() > 0.05 => {
             let late = 1e3 * late as f64 * period_s;
             let kind = if gain < 0.0 { CauseKind::WrongSign } else { CauseKind::ScaledSensor };
-            (kind, place, format!("{what} at {node} is {gain:.3} times what the model says, and {late:.2} ms late"))
+            (kind, place, format!("{what} at {node} is {gain:.3} times the model's value, and delayed by {late:.2} ms"))
         }
         AsIf::Changed { late, .. } => {
-            (CauseKind::LateSensor, place, format!("{what} at {node} is {:.2} ms late", 1e3 * late as f64 * period_s))
+            (CauseKind::LateSensor, place, format!("{what} at {node} is delayed by {:.2} ms", 1e3 * late as f64 * period_s))
         }
         AsIf::Same | AsIf::Unsteady { .. } | AsIf::Otherwise => {
-            (CauseKind::Unknown, place, format!("{what} at {node} differs by {share:.0} % from what its inputs make of it"))
+            (CauseKind::Unknown, place, format!("{what} at {node} differs by {share:.0} % from the response to its inputs"))
         }
     }
 }
@@ -95,7 +95,7 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
     let size = |f: &PhysicsFound| f.size.as_ref().map_or_else(String::new, |(name, value, unit)| format!(", {name} {value:.4} {unit}"));
     if let Some(first) = device.physics.first() {
         let text = format!(
-            "the master does {share:.0} % otherwise than its model; a diagnosis of the bag finds {} at {}{} (confidence {:.2})",
+            "the master differs by {share:.0} % from its model; a diagnosis of the bag finds {} at {}{} (confidence {:.2})",
             first.physics.replace('_', " "),
             first.place,
             size(first),
@@ -115,14 +115,14 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
                 CauseKind::OtherPhysics
             };
             let text = format!(
-                "the master does {share:.0} % otherwise than its model: {} is {:.4} where the graph says {:.4}",
+                "the master differs by {share:.0} % from its model: {} is {:.4}, and {:.4} in the graph",
                 n.path, n.found, n.declared
             );
             (kind, n.path.clone(), text)
         }
         None => {
             let text = format!(
-                "the master does {share:.0} % otherwise than its model, and a diagnosis of the bag does not say why: {}",
+                "the master differs by {share:.0} % from its model, and a diagnosis of the bag does not explain it: {}",
                 device.sentence
             );
             (CauseKind::Unknown, node.to_string(), text)

@@ -116,7 +116,7 @@ fn said(files: &DeviceFiles, changes: &[(Number, f64)]) -> DeviceFound {
     changes.iter().for_each(|(number, factor)| number.multiply(&mut changed, *factor));
     DeviceFound {
         word: "parameters".to_string(),
-        sentence: "no physics is missing: with other numbers the model does what was recorded".to_string(),
+        sentence: "no effect is missing: with other parameters the model reproduces the recording".to_string(),
         physics: Vec::new(),
         numbers: changes.iter().map(|(number, factor)| number.found(files, *factor)).collect(),
         files: Some(Box::new(changed)),

@@ -50,7 +50,7 @@ impl Recording {
             return Ok(Recording { session, ours: None });
         }
         let reader = Reader::open(path).map_err(wrong)?;
-        let hint = if reader.without_messages().is_some() { "" } else { "; a recording that we did not make needs --roles FILE" };
+        let hint = if reader.without_messages().is_some() { "" } else { "; a recording that backdrive did not make needs --roles FILE" };
         let graph = graph_of(&reader, &Overrides::default()).map_err(|e| RecordingError(format!("{e}{hint}")))?;
         let mut session = Session::from_bag(&reader, &graph).map_err(wrong)?;
         let recorded = Recorded::read(&reader).map_err(wrong)?;

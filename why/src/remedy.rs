@@ -186,7 +186,7 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
     });
     if let (Some(DeviceFiles { model: Some(model), fragment, .. }), Some((_, hz))) = (&master, &canceller) {
         let told = |high_pass_hz: f64| Change::Canceller {
-            of: format!("the model of the master as it was, {}", model.name),
+            of: format!("the recorded model of the master, {}", model.name),
             model: Some(Box::new(model.clone())),
             grip: fragment.clone().map(Box::new),
             high_pass_hz,

@@ -45,7 +45,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
         add(
             CauseKind::Delay,
             ways.clone(),
-            format!("the graph states delay, jitter or loss on the way to {ways}"),
+            format!("the graph states delay, jitter or loss on the connection to {ways}"),
             vec![Change::Delays { factor: 0.0 }],
         );
     }
@@ -92,7 +92,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
             add(kind, "canceller".to_string(), text, vec![right]);
         }
         if hz > 0.0 {
-            let text = format!("the canceller's estimate goes through a high-pass of {hz:.1} Hz");
+            let text = format!("the canceller's estimate is high-pass filtered at {hz:.1} Hz");
             add(CauseKind::FilterLag, "canceller".to_string(), text, vec![Change::HighPass { hz: 0.0 }]);
         }
     }
@@ -106,7 +106,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
         add(
             CauseKind::CoarseSensor,
             "master".to_string(),
-            "the model states a step or noise of the position sensor".to_string(),
+            "the model states a resolution or noise of the position sensor".to_string(),
             vec![Change::FinerSensors],
         );
     }

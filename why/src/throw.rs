@@ -51,9 +51,9 @@ impl std::fmt::Display for Throw {
         let motion = format!("moves the master {:.1} mm beyond the recorded range", 1e3 * self.beyond_m);
         let force = format!("pushes it with up to {:.1} N ({:.1} N were recorded)", self.force_n, self.recorded_force_n);
         match (self.moves, self.pushes) {
-            (true, true) => write!(f, "first it {motion} and {force}"),
-            (true, false) => write!(f, "first it {motion}"),
-            _ => write!(f, "first it {force}"),
+            (true, true) => write!(f, "at first it {motion} and {force}"),
+            (true, false) => write!(f, "at first it {motion}"),
+            _ => write!(f, "at first it {force}"),
         }
     }
 }

@@ -158,7 +158,7 @@ impl Contract {
             PerJoint::All(scale) => Ok(*scale),
             PerJoint::Each(by) => by.get(joint).copied().ok_or_else(|| {
                 let told: Vec<&str> = by.keys().map(String::as_str).collect();
-                format!("contract: {key}: says nothing of the joint {joint:?}; it has {}", told.join(", "))
+                format!("contract: {key}: does not contain the joint {joint:?}; it has {}", told.join(", "))
             }),
         }
     }

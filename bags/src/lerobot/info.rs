@@ -63,7 +63,7 @@ impl Info {
         };
         let Some(names) = names else { return Ok((1..=count).map(|number| format!("joint{number}")).collect()) };
         if names.len() != count {
-            return Err(wrong(format!("names: has {} names, the shape says {count}", names.len())));
+            return Err(wrong(format!("names: has {} names, but the shape has {count}", names.len())));
         }
         let plain = |name: &Value| name.as_str().map_or_else(|| name.to_string(), str::to_owned);
         let names: Vec<String> = names.iter().map(plain).collect();

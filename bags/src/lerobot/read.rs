@@ -147,11 +147,11 @@ fn read_episodes(
         let column = |name: &str, width: usize| -> Result<(Vec<f64>, NumberType), BagError> {
             let wrong = |what: String| BagError::File { path: path.clone(), what };
             let place = file.columns().find(|(_, found, _)| *found == name).map(|(place, _, _)| place);
-            let place = place.ok_or_else(|| wrong(format!("has no column {name:?}, of which meta/info.json tells")))?;
+            let place = place.ok_or_else(|| wrong(format!("has no column {name:?}, which meta/info.json lists")))?;
             let (values, found, of) = file.matrix(place)?;
             match found == width || values.is_empty() {
                 true => Ok((values, of)),
-                false => Err(wrong(format!("column {name:?}: has {found} numbers a row, meta/info.json says {width}"))),
+                false => Err(wrong(format!("column {name:?}: has {found} numbers a row, meta/info.json states {width}"))),
             }
         };
         let (stamps, frames, numbers) = (column("timestamp", 1)?.0, column("frame_index", 1)?.0, column("episode_index", 1)?.0);

@@ -135,7 +135,7 @@ fn prepare(path: &Path, table: &Table, joints: &[String], contract: &Contract, n
     let others: Vec<&str> =
         table.columns.iter().map(|column| column.name.as_str()).filter(|name| !used.iter().any(|used| used == name)).collect();
     if !others.is_empty() {
-        notes.push(format!("{}: left out, for they are nothing of a joint: {}", path.display(), others.join(", ")));
+        notes.push(format!("{}: omitted, because they do not belong to a joint: {}", path.display(), others.join(", ")));
     }
     Ok(Prepared { rows: times.len(), fps, features })
 }

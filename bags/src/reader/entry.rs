@@ -51,8 +51,8 @@ impl TopicRef {
         let (topic, encoding) = (&self.name, if self.encoding.is_empty() { "of no stated encoding" } else { &self.encoding });
         let schema = if self.schema_encoding.is_empty() { "no schema".to_owned() } else { format!("a schema of {}", self.schema_encoding) };
         Some(format!(
-            "topic {topic} is not read: its messages are {encoding} with {schema}, and {why}; write its numbers as CSV or \
-             .npz (Python: mcap.reader.make_reader with a decoder factory of that encoding) and import that"
+            "topic {topic} is not read: its messages are {encoding} with {schema}, and {why}. Write its values as CSV or .npz (Python: \
+             mcap.reader.make_reader with a decoder factory of that encoding) and import that"
         ))
     }
 

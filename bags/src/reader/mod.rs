@@ -255,7 +255,7 @@ fn described(path: &Path, metadata: &[Metadata], attachments: Attachments, damag
     let text = |name: &str| {
         let found = texts.get(name).cloned();
         if found.is_none() {
-            missing.borrow_mut().push(format!("it names the file \"{name}\" as one of its own, and does not hold it"));
+            missing.borrow_mut().push(format!("it lists the file \"{name}\" but does not contain it"));
         }
         found
     };

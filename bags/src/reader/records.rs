@@ -40,7 +40,7 @@ fn read_records(path: &Path, frame: &Frame, body: &[u8], strict: bool) -> (Vec<R
     let most = body.len().saturating_mul(256).clamp(LIKELY_CHUNK, LARGEST_CHUNK);
     let unpacked = body.get(16..24).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes));
     if unpacked > most as u64 {
-        let error = damaged(format!("a chunk of {} bytes says that it unpacks to {unpacked}", body.len()));
+        let error = damaged(format!("a chunk of {} bytes claims to unpack to {unpacked}", body.len()));
         return (Vec::new(), (!frame.cut).then_some(error));
     }
     // Of a whole chunk the checksum is verified before anything in it is believed: lengths in a damaged one ask for any amount of memory.

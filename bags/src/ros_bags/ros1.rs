@@ -40,7 +40,7 @@ pub(crate) fn copy(file: &Path, target: &mut Target, most_bytes: u64) -> Result<
                 MessageRecord::MessageData(message) => {
                     let topic = topics.get(&message.conn_id).ok_or_else(|| {
                         wrong(format!(
-                            "a message at {} ns is of connection {}, of which nothing is said before it",
+                            "a message at {} ns is of connection {}, which is not described before it",
                             message.time, message.conn_id
                         ))
                     })?;
@@ -80,8 +80,8 @@ fn check_extent(file: &Path) -> Result<(), BagError> {
     let begin = number((MAGIC + 4).saturating_add(header), 4).map(|filling| (MAGIC + 8 + header) as u64 + filling);
     match (begin, index) {
         (Some(_), Some(0)) => wrong("has no index: it was not closed; `rosbag reindex` makes one"),
-        (Some(begin), Some(index)) if index < begin => wrong("byte 13: its header is damaged: the index would stand before the messages"),
-        (Some(_), Some(index)) if index > size => wrong("was cut off: its index is missing; `rosbag reindex` makes one for what is there"),
+        (Some(begin), Some(index)) if index < begin => wrong("byte 13: its header is damaged: the index would precede the messages"),
+        (Some(_), Some(index)) if index > size => wrong("was cut off: its index is missing; `rosbag reindex` rebuilds it"),
         (Some(_), Some(_)) => Ok(()),
         _ => wrong("byte 13: its header cannot be read; it was cut off or is damaged"),
     }
@@ -140,7 +140,7 @@ fn announce(target: &mut Target, name: &str, type_name: &str, definition: &str) 
             Ok(Topic { name: name.to_owned(), place, converter: Some(converter) })
         }
         Err(what) => {
-            let note = format!("its messages are kept in the form of ROS 1, of which no numbers are read: {what}");
+            let note = format!("its messages are kept in the form of ROS 1, which is not decoded: {what}");
             let form = Form { type_name, schema_encoding: "ros1msg", definition, encoding: "ros1", qos: "" };
             let place = target.topic(name, &form, Some(note))?;
             Ok(Topic { name: name.to_owned(), place, converter: None })

@@ -20,7 +20,7 @@ pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
             // Before ROS 2 Foxy there was no quality of service.
             database.prepare("SELECT id, name, type, serialization_format, '' FROM topics ORDER BY id")
         });
-    let query = query.as_mut().map_err(|error| wrong(format!("is no rosbag2: {error}")))?;
+    let query = query.as_mut().map_err(|error| wrong(format!("is not a rosbag2: {error}")))?;
     let mut rows = query.query([]).map_err(failed)?;
     while let Some(row) = rows.next().map_err(failed)? {
         let text = |column: usize| row.get::<_, Option<String>>(column).map(Option::unwrap_or_default).map_err(failed);
@@ -30,10 +30,8 @@ pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
         let known = definitions.get(&type_name).cloned().or_else(|| definitions::of(&type_name));
         let note = match &known {
             Some(_) if encoding == "cdr" => None,
-            Some(_) => Some(format!("its messages are in the form {encoding:?}, of which no numbers are read; they are kept as they are")),
-            None => {
-                Some(format!("the bag has no definition of {type_name}, so no numbers of it are read; its messages are kept as they are"))
-            }
+            Some(_) => Some(format!("its messages are in the form {encoding:?}, which is not decoded; they are kept unchanged")),
+            None => Some(format!("the bag has no definition of {type_name}, so it is not decoded; its messages are kept unchanged")),
         };
         let schema_encoding = if known.is_some() { "ros2msg" } else { "" };
         let definition = known.unwrap_or_default();

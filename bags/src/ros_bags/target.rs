@@ -101,7 +101,7 @@ impl Target {
             .transpose();
         let (schema, note) = match parsed {
             Ok(schema) => (schema, note),
-            Err(what) => (None, Some(format!("no numbers of it are read, its messages are kept as they are: {what}"))),
+            Err(what) => (None, Some(format!("it is not decoded, its messages are kept unchanged: {what}"))),
         };
         let stamp = schema.as_ref().and_then(|schema| schema.find("header.stamp").ok());
         let told = RosbagTopic {
@@ -155,7 +155,10 @@ impl Target {
             topic.told.clock = clock_remarks(&times);
             topic.told.notes.extend(topic.changed.map(|message| {
                 let joint = topic.joints.first().map_or("", String::as_str);
-                format!("message {message} has other joints, or in other places, than the first: name them in place of numbers, as in position[{joint}]")
+                format!(
+                    "message {message} has other joints than the first, or in another order: use names instead of numbers, as in \
+                    position[{joint}]"
+                )
             }));
             topic.told
         });

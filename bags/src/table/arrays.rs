@@ -28,9 +28,9 @@ pub(super) fn table(arrays: Vec<Array>, options: &ImportOptions) -> Result<Table
     let notes = match (others.is_empty(), options.rate_hz) {
         (true, _) => Vec::new(),
         (false, None) if options.headings.is_none() => {
-            vec![format!("left out, for they are no numbers as long as {}: {}", options.time, others.join(", "))]
+            vec![format!("omitted, because they are not numeric columns as long as {}: {}", options.time, others.join(", "))]
         }
-        (false, _) => vec![format!("left out, for they are no numbers of {rows} rows: {}", others.join(", "))],
+        (false, _) => vec![format!("omitted, because they are not numeric columns of {rows} rows: {}", others.join(", "))],
     };
     Ok(Table { columns, notes, lines: None })
 }
@@ -59,7 +59,7 @@ fn no_times(arrays: &[Array], options: &ImportOptions) -> String {
     let matrices: Vec<&Array> =
         arrays.iter().filter(|array| array.size.iter().copied().max().is_some_and(|rows| is_matrix(array, rows))).collect();
     let structures = names(&|array| matches!(array.held, Held::Fields(_)));
-    let by_rate = "or say with --rate HZ how many rows a second has";
+    let by_rate = "or give the sampling rate with --rate HZ";
     let what = match (vectors.as_slice(), matrices.as_slice(), structures.as_slice()) {
         ([], [], []) => "there are no vectors".to_owned(),
         ([], [matrix, ..], _) => {
@@ -72,7 +72,7 @@ fn no_times(arrays: &[Array], options: &ImportOptions) -> String {
         ([], [], _) => format!("name the structure whose fields the columns are with --variable: {}", structures.join(", ")),
         _ => format!("vectors are {}: name one with --time, {by_rate}", vectors.join(", ")),
     };
-    format!("{}: is no vector of times; {what}", options.time)
+    format!("{}: is not a vector of times; {what}", options.time)
 }
 
 fn is_numbers(array: &Array) -> bool {
@@ -104,6 +104,6 @@ fn cells(held: Held) -> Cells {
         Held::Numbers(values, of) => Cells::Numbers(values, of),
         Held::Whole(_, NumberType::Uint64) => Cells::Other("whole numbers beyond 2^53".to_owned()),
         Held::Whole(values, _) => Cells::Large { values, per_second: None },
-        Held::Text(_) | Held::Fields(_) | Held::Other(_) => Cells::Other("something that is no number".to_owned()),
+        Held::Text(_) | Held::Fields(_) | Held::Other(_) => Cells::Other("something that is not a number".to_owned()),
     }
 }

@@ -100,7 +100,7 @@ impl Read {
             }
             Err(_) if !cell.is_empty() || (self.values.is_empty() && !self.is_asked_for) => {
                 self.values = Vec::new();
-                self.other = Some(format!("something that is no number, first in line {line}: {shown}{},", comma_remark(cell)));
+                self.other = Some(format!("something that is not a number, first in line {line}: {shown}{},", comma_remark(cell)));
             }
             _ => {
                 let advice = "leave such rows out, or name the columns that count with --map";

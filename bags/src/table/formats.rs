@@ -57,7 +57,7 @@ impl TableFormat {
         if start.starts_with(&mcap::MAGIC[..6]) {
             let unread = Reader::open(path).map(|reader| reader.topics().iter().filter_map(|topic| topic.unread()).collect::<Vec<_>>());
             return wrong(&match unread.unwrap_or_default().as_slice() {
-                [] => "is an MCAP file already: every command takes it as it is".to_owned(),
+                [] => "is an MCAP file already: every command reads it directly".to_owned(),
                 unread => format!("is an MCAP file already, and {}", unread.join("; ")),
             });
         }
@@ -112,7 +112,7 @@ pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result
 pub(crate) fn read_table(table: &Path, options: &ImportOptions, missing: Missing) -> Result<Table, BagError> {
     let format = TableFormat::of_file(table)?;
     if let Some(variable) = options.variable.as_ref().filter(|_| format != TableFormat::Mat) {
-        return Err(BagError::Usage(format!("{}: is no MATLAB file, so it has no structure {variable:?}", table.display())));
+        return Err(BagError::Usage(format!("{}: is not a MATLAB file, so it has no structure {variable:?}", table.display())));
     }
     let mut read = match format {
         TableFormat::Csv => csv_file::read_cells(table, options, missing)?,

@@ -42,7 +42,7 @@ pub(crate) fn variables(file: &[u8], memory: &Memory) -> Result<Vec<Array>, Stri
     let big_endian = match &header[126..128] {
         b"IM" => false,
         b"MI" => true,
-        other => return Err(format!("byte 126: expected IM or MI, which tell the order of bytes, found {other:02x?}")),
+        other => return Err(format!("byte 126: expected IM or MI, which give the byte order, found {other:02x?}")),
     };
     let version = if big_endian { header[124] } else { header[125] };
     if version != 1 {

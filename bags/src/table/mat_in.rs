@@ -23,7 +23,7 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
         match arrays.iter().position(|array| array.name == *variable) {
             Some(place) => match arrays.swap_remove(place).held {
                 Held::Fields(fields) => arrays = fields,
-                _ => return Err(wrong(format!("{variable}: is no structure with fields"))),
+                _ => return Err(wrong(format!("{variable}: is not a structure with fields"))),
             },
             None => return Err(wrong(format!("{variable}: there is none; there are {}", there()))),
         }

@@ -50,9 +50,10 @@ pub(crate) fn write(table: &Table, out: &Path) -> Result<Vec<String>, BagError> 
     sink.flush().map_err(failed)?;
     Ok(match renamed.as_slice() {
         [] => Vec::new(),
-        [(name, heading)] => vec![format!("{heading:?} is called {name}, for MATLAB takes letters, digits and _ alone")],
+        [(name, heading)] => vec![format!("{heading:?} is renamed to {name}, because MATLAB accepts only letters, digits and _")],
         [(name, heading), ..] => vec![format!(
-            "{} columns have another name, for MATLAB takes letters, digits and _ alone: {heading:?} is called {name}; {NAMES} in the file keeps the headings",
+            "{} columns are renamed, because MATLAB accepts only letters, digits and _: {heading:?} is now {name}; {NAMES} in the file \
+                keeps the headings",
             renamed.len()
         )],
     })

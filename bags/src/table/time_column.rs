@@ -36,7 +36,7 @@ pub(super) fn times_of<'a>(path: &Path, table: &'a Table, options: &ImportOption
                 return Err(table.no_column(
                     path,
                     asked,
-                    ": name the one with the times with --time, or say with --rate HZ how many rows a second has",
+                    ": name the one with the times with --time, or give the sampling rate with --rate HZ",
                 ));
             }
         },
@@ -45,7 +45,7 @@ pub(super) fn times_of<'a>(path: &Path, table: &'a Table, options: &ImportOption
     // A unit that is stated and not known is no reason to take the times for seconds.
     let unit = match unit {
         None => units::of_times(heading)
-            .map_err(|what| table.wrong_columns(path, format!("column {heading:?}: {what}; or say it as --time \"{heading} [ms]\"")))?,
+            .map_err(|what| table.wrong_columns(path, format!("column {heading:?}: {what}; or give it as --time \"{heading} [ms]\"")))?,
         unit => unit,
     };
     if let Some(unit) = unit.filter(|unit| unit.kind != Kind::Time) {
@@ -69,7 +69,9 @@ pub(super) fn times_of<'a>(path: &Path, table: &'a Table, options: &ImportOption
             (times, NumberType::Double, Some(format!("times are counted from the first row, whose {name:?} is {first}")))
         }
         Cells::Other(holds) => {
-            return Err(table.wrong_columns(path, format!("column {name:?} holds {}; times are numbers", holds.trim_end_matches(','))));
+            return Err(
+                table.wrong_columns(path, format!("column {name:?} contains {}; times must be numbers", holds.trim_end_matches(',')))
+            );
         }
     };
     if values.is_empty() {
@@ -105,7 +107,7 @@ fn a_second(unit: Unit) -> f64 {
 }
 
 fn say_unit(name: &str) -> String {
-    format!("say their unit, in the heading or as --time \"{name} [ns]\"")
+    format!("state their unit, in the heading or as --time \"{name} [ns]\"")
 }
 
 /// Times have to grow: every step in a bag has one.
@@ -118,13 +120,13 @@ fn check(path: &Path, table: &Table, name: &str, times: &[f64]) -> Result<(), Ba
         return Err(table.wrong(
             path,
             row,
-            format!("{:?} is no time in s; if the times are in another unit, {}", times[row], say_unit(name)),
+            format!("{:?} is not a time in s; if the times are in another unit, {}", times[row], say_unit(name)),
         ));
     }
     if let Some(row) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
         let (before, now) = (times[row], times[row + 1]);
         let what = match now == before {
-            true => format!("the time {now:?} s stands in two rows; leave out what was recorded twice"),
+            true => format!("the time {now:?} s is in two rows; remove the duplicate"),
             false => format!("time goes back from {before:?} to {now:?} s; cut the recording there"),
         };
         return Err(table.wrong(path, row + 1, what));
@@ -134,6 +136,6 @@ fn check(path: &Path, table: &Table, name: &str, times: &[f64]) -> Result<(), Ba
     if steps.is_empty() || *steps.select_nth_unstable_by(middle, f64::total_cmp).1 < NO_SECONDS {
         return Ok(());
     }
-    let what = format!("the times in {name:?} are {:?} s apart as a rule, which no recording is: {}", steps[middle], say_unit(name));
+    let what = format!("the times in {name:?} are usually {:?} s apart, which is implausible: {}", steps[middle], say_unit(name));
     Err(table.wrong_columns(path, what))
 }

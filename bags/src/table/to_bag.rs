@@ -51,10 +51,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
                 let unit = unit_of(&column.name);
                 let is_meant = options.columns.is_empty() || options.columns.iter().any(|map| map.column == column.name);
                 if let (None, (_, Some(text)), true) = (unit, units::split(&column.name), is_meant && Some(place) != clock.place) {
-                    notes.push(format!(
-                        "column {:?}: the unit {text:?} is not known, so its numbers stay as they are in the file",
-                        column.name
-                    ));
+                    notes.push(format!("column {:?}: the unit {text:?} is not known, so its values stay unchanged", column.name));
                 }
                 known.insert(place, Known { name, values, unit, of: *of });
             }
@@ -75,8 +72,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
     remember(TIME_TOPIC, Quantity::Position, 0, clock.of);
     let maps = placed(path, table, &known, &skipped, clock.place, options)?;
     if maps.len() > MOST_COLUMNS {
-        let what =
-            format!("has {} columns of numbers, and a bag holds at most {MOST_COLUMNS}; name those that count with --map", maps.len());
+        let what = format!("has {} numeric columns, and a bag can contain at most {MOST_COLUMNS}; select columns with --map", maps.len());
         return Err(table.wrong_columns(path, what));
     }
     let mut sources: Vec<Source> = Vec::with_capacity(maps.len());
@@ -87,7 +83,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         }
         if let Some(other) = taken.insert((&map.topic, map.quantity.field(), map.axis), &map.column) {
             let place = format!("{}[{}] of {}", map.quantity.field(), map.axis, map.topic);
-            let what = format!("columns {other:?} and {:?} both go to {place}; say with --map where each goes", map.column);
+            let what = format!("columns {other:?} and {:?} both map to {place}; give their topics with --map", map.column);
             return Err(table.wrong_columns(path, what));
         }
         if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
@@ -132,7 +128,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         ..BagHeader::default()
     };
     record(bag, &header, times, &sources, options.overwrite)?;
-    notes.extend(skipped.iter().map(|(name, holds)| format!("column {name:?} holds {holds} and was left out")));
+    notes.extend(skipped.iter().map(|(name, holds)| format!("column {name:?} holds {holds} and was omitted")));
     let topics = header.topics.into_iter().skip(1).map(|info| info.topic.name).collect();
     let skipped = skipped.into_iter().map(|(name, _)| name.to_owned()).collect();
     Ok(ImportReport { rows: times.len() as u64, topics, skipped, notes, clock: clock_remarks(times) })
@@ -159,7 +155,7 @@ fn placed<'a, 'b>(
             true => {
                 let why: String =
                     skipped.iter().map(|(name, holds)| format!("; column {name:?} holds {}", holds.trim_end_matches(','))).collect();
-                Err(table.wrong_columns(path, format!("there is no column of numbers beside the times{why}")))
+                Err(table.wrong_columns(path, format!("there is no numeric column besides the times{why}")))
             }
         };
     }

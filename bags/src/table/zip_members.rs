@@ -50,7 +50,7 @@ pub(super) fn members(file: &[u8]) -> Result<Vec<Member<'_>>, String> {
         let local = file
             .get(place..)
             .filter(|local| local.starts_with(LOCAL))
-            .ok_or_else(|| format!("{name}: is not where the directory says; it is damaged"))?;
+            .ok_or_else(|| format!("{name}: is not at the offset in the directory; the file is damaged"))?;
         let data = 30 + number(local, 26, 2)? + number(local, 28, 2)?;
         let packed = local.get(data..data + size).ok_or_else(cut)?;
         found.push(Member { crc: number(entry, 16, 4)? as u32, name, packed, is_deflated: method == 8 });
@@ -73,7 +73,7 @@ impl Member<'_> {
         read.map_err(|error| format!("cannot be unpacked: {error}"))?;
         if bytes.len() as u64 > most {
             return Err(format!(
-                "is larger than the limit for what is left of the file, {} MiB; save a piece of it, or allow more with --memory (MiB)",
+                "is larger than the remaining limit for the file, {} MiB; split it, or allow more with --memory (MiB)",
                 most >> 20
             ));
         }

@@ -34,7 +34,7 @@ pub enum Feedforward {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ControllerError {
     /// The law needs values that only a model provides.
-    #[error("law \"{law}\" needs a model: it says the axis' inertia and friction")]
+    #[error("law \"{law}\" needs a model with the inertia and friction of the axis")]
     NeedsModel {
         /// Name of the law.
         law: &'static str,

@@ -44,7 +44,7 @@ pub(super) struct Axis {
     slow: f64,
     largest_force: f64,
     /// The last reported firmness, if there was one.
-    told: Option<f64>,
+    reported: Option<f64>,
 }
 
 impl Axis {
@@ -86,7 +86,7 @@ impl Scheduled {
             induced: 0.0,
             slow: 0.0,
             largest_force: 0.0,
-            told: None,
+            reported: None,
         };
         let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
         let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
@@ -137,9 +137,9 @@ impl Scheduled {
             let changed = measured.is_some_and(|measured| axis.estimator.step(measured[number], |hand| self.bank.position(hand, number)));
             let estimate = axis.estimator.estimate();
             let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
-            let is_another = axis.told.is_none_or(|told| (firmness / told).ln().abs() > TELLS_AFTER);
+            let is_another = axis.reported.is_none_or(|reported| (firmness / reported).ln().abs() > TELLS_AFTER);
             if unsure < TELLS_AT && is_another {
-                axis.told = Some(firmness);
+                axis.reported = Some(firmness);
                 events.push("hand_holds", firmness, 0);
             }
             let softness = axis.cancelled(&estimate, changed);

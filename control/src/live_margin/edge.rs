@@ -30,7 +30,7 @@ pub enum Edge {
 
 /// A core's report on the loop's margin; the fields of [`backdrive_msgs::Margin`] that are its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Told {
+pub struct MarginEstimate {
     /// The axis that is nearest to its stability limit, from 0.
     pub axis: u32,
     /// One of [`backdrive_msgs::margin`].
@@ -47,9 +47,9 @@ pub struct Told {
     pub decay_per_s: f64,
 }
 
-impl Told {
+impl MarginEstimate {
     /// The report on an axis at the scales now in force. Without a dither there is no stability limit: `edge` is `None`.
-    pub fn of(axis: usize, edge: Option<Edge>, mu: f64, lambda: f64, ring: Option<f64>) -> Told {
+    pub fn of(axis: usize, edge: Option<Edge>, mu: f64, lambda: f64, ring: Option<f64>) -> MarginEstimate {
         let (known, factor, deviation, frequency_hz) = match edge {
             None => (margin::NO_DITHER, f64::NAN, f64::NAN, f64::NAN),
             Some(Edge::Free) => (margin::FREE, f64::NAN, f64::NAN, f64::NAN),
@@ -63,11 +63,11 @@ impl Told {
             Some(_) => (margin::NOISY, f64::NAN, f64::NAN, f64::NAN),
         };
         let decay_per_s = ring.unwrap_or(f64::NAN);
-        Told { axis: axis as u32, known, gain: mu * lambda, factor, deviation, frequency_hz, decay_per_s }
+        MarginEstimate { axis: axis as u32, known, gain: mu * lambda, factor, deviation, frequency_hz, decay_per_s }
     }
 
     /// Whether it is the worse news of two axes: a known margin before a bound, that before what is not known.
-    pub fn is_tighter_than(&self, other: &Told) -> bool {
+    pub fn is_tighter_than(&self, other: &MarginEstimate) -> bool {
         let (own, others) = (rank(self.known), rank(other.known));
         own > others || own == others && self.factor < other.factor
     }

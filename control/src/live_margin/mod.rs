@@ -19,7 +19,7 @@ mod estimate;
 mod lines;
 mod ring_down;
 
-pub use edge::{Edge, Told};
+pub use edge::{Edge, MarginEstimate};
 pub use estimate::LiveMargin;
 pub use lines::MAX_LINES;
 pub(crate) use ring_down::CORNER_HZ;

@@ -27,10 +27,13 @@ pub enum DesignError {
     #[error("the back-off must be above 1, is {0}: at the smallest m itself the gains are infinite")]
     BackOff(f64),
     /// The Riccati equation has no solution that could be computed.
-    #[error("the Riccati equation has no stabilising solution; the model's numbers may be too far apart")]
+    #[error("the Riccati equation has no stabilising solution; the model's parameters may differ by too many orders of magnitude")]
     NoSolution,
     /// The gains do not satisfy the inequality.
-    #[error("the gains do not satisfy the matrix inequality (largest eigenvalue {0:.3e}); the model's numbers may be too far apart")]
+    #[error(
+        "the gains do not satisfy the matrix inequality (largest eigenvalue {0:.3e}); the model's parameters may differ by too many \
+        orders of magnitude"
+    )]
     NotVerified(f64),
 }
 

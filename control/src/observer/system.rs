@@ -36,7 +36,7 @@ pub enum Quantity {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemError {
     /// The model has no `[[axes]]`.
-    #[error("has no [[axes]]: an observer needs to know which body the unknown force acts on and what is measured")]
+    #[error("has no [[axes]]: an observer needs the body on which the unknown force acts, and the measured signals")]
     NoAxes,
     /// A force acts on a point of a robot.
     #[error("has points of a robot ([point.{0}]): an observer knows bodies with an inertia of their own; make the joints its axes")]
@@ -48,7 +48,7 @@ pub enum SystemError {
     #[error("output \"{0}\" is neither a position nor a velocity of a body")]
     NoMotion(String),
     /// Not as many numbers as there are measured quantities.
-    #[error("{given} numbers of noise for {needed} measured quantities")]
+    #[error("{given} noise levels for {needed} measured quantities")]
     Noise {
         /// How many are there.
         given: usize,
@@ -56,7 +56,7 @@ pub enum SystemError {
         needed: usize,
     },
     /// The measured signals do not determine the unknown force.
-    #[error("what is measured does not determine the unknown force: {rank} of {states} states can be told from it")]
+    #[error("the measurements do not determine the unknown force: only {rank} of {states} states are observable")]
     Unobservable {
         /// Rank of the observability matrix.
         rank: usize,

@@ -36,7 +36,7 @@ pub fn audit(problem: &Problem, data: &Data) -> Vec<Remark> {
     for limit in &data.clipped {
         let log = data.motions.get(limit.log).map_or("", |motion| motion.name.as_str());
         let message = format!(
-            "stands at its limit of {:.4} in {:.1} % of the samples: it is clipped; these samples are left out",
+            "stands at its limit of {:.4} in {:.1} % of the samples: it is clipped; these samples are ignored",
             limit.level,
             100.0 * limit.share
         );
@@ -49,8 +49,7 @@ pub fn audit(problem: &Problem, data: &Data) -> Vec<Remark> {
         out.push(remark("sign", format!("{joint}.torque"), message, Weight::Caution));
     }
     for unused in &data.unused {
-        let message =
-            format!("({}) is not used: {}; its force stands in the torque as if the model did not have it", unused.kind, unused.why);
+        let message = format!("({}) is not used: {}; its force is treated as part of the unexplained torque", unused.kind, unused.why);
         out.push(remark("element", unused.place(&problem.model_file), message, Weight::Caution));
     }
     out.sort_by_key(|r| std::cmp::Reverse(r.weight));
@@ -63,7 +62,7 @@ fn clock(log: &Log, out: &mut Vec<Remark>) {
     let scatter = rms(steps.iter().map(|s| s - mean)) / mean.max(1e-12);
     if scatter > 0.02 {
         let message =
-            format!("the clock is uneven: steps of {:.2} ms scatter by {:.0} %; the logged times are used", 1e3 * mean, 100.0 * scatter);
+            format!("the clock is irregular: steps of {:.2} ms vary by {:.0} %; the logged times are used", 1e3 * mean, 100.0 * scatter);
         out.push(remark("clock", log.name.clone(), message, Weight::Note));
     }
 }
@@ -73,11 +72,11 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
     let wide = range(problem.fit.iter().flat_map(|l| l.position[j].iter().copied()));
     let turns = problem.tree.coordinates()[j].kind == backdrive_plant::robot::JointKind::Revolute;
     if wide < RESTS {
-        let message = "never moves in the logs for fitting: nothing of its friction or inertia can be told; move it".to_string();
+        let message = "never moves in the logs for fitting: its friction and inertia cannot be identified; move it".to_string();
         out.push(remark("constant", format!("{joint}.position"), message, Weight::Unusable));
     } else if turns && wide > TURNS {
         let message = format!(
-            "runs over {wide:.0} rad, which is {:.1} turns: it looks like degrees; say unit = \"deg\" in [joints.{joint}]",
+            "has a range of {wide:.0} rad, which is {:.1} turns: it looks like degrees; set unit = \"deg\" in [joints.{joint}]",
             wide / std::f64::consts::TAU
         );
         out.push(remark("unit", format!("{joint}.position"), message, Weight::Caution));
@@ -87,18 +86,19 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
         // It has no motor, and the set states this.
     } else if rms(logs().flat_map(|l| l.torque[j].iter().copied())) == 0.0 {
         let message = format!(
-            "is 0 throughout: the column is empty or another one is meant. If this joint has no motor, say torque = 0 in [joints.{joint}] of set.toml"
+            "is 0 in all samples: the column is empty or the wrong one. If this joint has no motor, set torque = 0 in [joints.{joint}] of \
+                set.toml"
         );
         out.push(remark("constant", format!("{joint}.torque"), message, Weight::Unusable));
     } else if torque == 0.0 {
-        let message = "has the same value throughout: no motor does that while its arm moves; name the column of its torque".to_string();
+        let message = "is constant: no motor has a constant torque while its arm moves; name the column of its torque".to_string();
         out.push(remark("constant", format!("{joint}.torque"), message, Weight::Unusable));
     }
     // The rate from the drive beside the derivative.
     let (mut off, mut size, mut product, mut own) = (0.0, 0.0, 0.0, 0.0);
     for motion in &data.motions {
-        let Some(told) = &motion.told[j] else { continue };
-        for (a, b) in told.iter().zip(&motion.velocity[j]) {
+        let Some(recorded) = &motion.recorded_velocity[j] else { continue };
+        for (a, b) in recorded.iter().zip(&motion.velocity[j]) {
             off += (a - b) * (a - b);
             size += b * b;
             product += a * b;
@@ -109,7 +109,7 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
         let (share, factor, alike) = ((off / size).sqrt(), product / size, product / (size * own).sqrt());
         if share > RATE_DIFFERS {
             let message = if alike < -0.9 {
-                "has the opposite sign of the derivative of the position: one of the two columns is turned round".to_string()
+                "has the opposite sign of the derivative of the position: one of the two columns has the wrong sign".to_string()
             } else if alike > 0.97 {
                 format!("is {factor:.3} times the derivative of the position: it has another unit")
             } else {
@@ -145,14 +145,14 @@ fn torques_fit(problem: &Problem, data: &Data, out: &mut Vec<Remark>) {
     }
     for j in 0..joints {
         if correlation[j][j] < -EXPLAINED {
-            let message = "has the opposite sign of what the links take: turn it round with scale = -1, or turn the position".to_string();
+            let message = "has the opposite sign of the torque that the links need: set scale = -1 for it or for the position".to_string();
             out.push(remark("sign", format!("{}.torque", problem.joints[j]), message, Weight::Caution));
         }
         for k in 0..j {
             let straight = correlation[j][j].min(correlation[k][k]);
             if correlation[j][k].min(correlation[k][j]) > EXPLAINED && straight < 0.5 * EXPLAINED {
                 let (a, b) = (&problem.joints[j], &problem.joints[k]);
-                let message = format!("each looks like the other's: the torque columns of {a} and {b} may be swapped");
+                let message = format!("each fits the other joint: the torque columns of {a} and {b} may be swapped");
                 out.push(remark("sign", format!("{a}.torque and {b}.torque"), message, Weight::Caution));
             }
         }
@@ -187,7 +187,7 @@ fn swapped_positions(problem: &Problem, data: &Data, out: &mut Vec<Remark>) {
             if straight > 0.5 && left(Some((j, k))) < 0.2 * straight {
                 let (a, b) = (&problem.joints[j], &problem.joints[k]);
                 let message =
-                    format!("with the positions of {a} and {b} changed over, the links take what was measured: the columns are swapped");
+                    format!("with the positions of {a} and {b} exchanged, the links need the measured torque: the columns are swapped");
                 out.push(remark("sign", format!("{a}.position and {b}.position"), message, Weight::Caution));
             }
         }

@@ -41,7 +41,7 @@ pub fn base(problem: &Problem) -> Result<Vec<Base>, ArmError> {
         velocity: signals(1, 2.0),
         acceleration: signals(2, 5.0),
         torque: Vec::new(),
-        told: Vec::new(),
+        recorded_velocity: Vec::new(),
         moves: Vec::new(),
         counts: Vec::new(),
         payload: None,

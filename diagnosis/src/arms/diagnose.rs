@@ -92,8 +92,9 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     remarks.extend(load_remarks(&data, &found));
     let mut whole = Data::new(problem, settings.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
-        *fit = consistent(&data, fit, &found.weights)
-            .ok_or_else(|| ArmError::Robot("no inertial parameters that bodies can have were found near the regression's".to_string()))?;
+        *fit = consistent(&data, fit, &found.weights).ok_or_else(|| {
+            ArmError::Robot("no physically feasible inertial parameters were found near those of the regression".to_string())
+        })?;
     }
     whole.see(&data.parameters(&found.best))?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
@@ -114,7 +115,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
         let Some(ratio) = judged.as_ref().map(Judged::ratio).filter(|r| *r > AGAINST) else { continue };
         let term = &found.best.structure.terms[index];
         notes.push(format!(
-            "simulated in closed loop the model needs {:.0} % more correction with {} {} than without it: it is not asserted",
+            "in closed-loop simulation the model needs {:.0} % more correction with {} {} than without it, so the finding is not claimed",
             100.0 * (ratio - 1.0),
             term.physics.facts().words,
             crate::verdict::words::place(&place(&data, term))
@@ -123,17 +124,17 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     notes.extend(coupled_by_many(problem, &found.best.structure));
     if data.most_tolerance == 0 {
         notes.push(format!(
-            "{} has no motor, so its friction is known only in proportion to its inertia. Much of the torque of another joint is unexplained, so \
-             that inertia is the one of the file",
+            "{} has no motor, so its friction is known only relative to its inertia. Much of another joint's torque is unexplained, so \
+             the file's inertia is used",
             problem.passive().join(", ")
         ));
     }
     if cut_short {
-        notes.push("the search was interrupted: what else is missing was not looked for to the end".to_string());
+        notes.push("the search was interrupted: other missing effects were not fully searched for".to_string());
     }
     if rare(&found.best.structure) >= settings.effects {
         notes.push(format!(
-            "the search ended at {} physics beside those that every joint has, as many as were allowed (--effects): what remains may be others",
+            "the search ended at {} effects, the limit of --effects, besides those of every joint: more may be missing",
             settings.effects
         ));
     }
@@ -177,15 +178,13 @@ fn slip_of_whole(whole: &Data, fit: &mut Fit) {
 
 /// Joints whose load hardly changes: load-dependent friction cannot be distinguished from friction that does not depend on load.
 fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
-    let remark = |j: usize| {
-        Remark {
+    let remark = |j: usize| Remark {
         what: "load".to_string(),
         place: data.problem.joints[j].clone(),
-        message: "carries nearly the same load wherever it moves: whether its friction grows with the load these logs do not tell; the next motion is planned so \
-                  that it does"
+        message: "carries nearly the same load everywhere: these logs do not show whether its friction grows with the load; the next \
+                  motion is planned to show it"
             .to_string(),
         weight: Weight::Caution,
-    }
     };
     let untold = same_load(data, found);
     let rubs = |j: usize| found.best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
@@ -201,8 +200,8 @@ fn next(plan: &Plan, problem: &Problem) -> NextExperiment {
         let [x, y, z] = [known.at.x, known.at.y, known.at.z];
         let link = problem.robot.links.get(*link).map_or(String::new(), |l| l.name.clone());
         sentence += &format!(
-            " with {} kg fastened to link \"{link}\", its centre at ({x}, {y}, {z}) m of that link's frame, and say so of each of the logs in the set \
-             ([files.\"LOG.csv\"] payload = {{ mass = {}, at = [{x:?}, {y:?}, {z:?}] }})",
+            " with {} kg fastened to link \"{link}\", its centre at ({x}, {y}, {z}) m of that link's frame, and state it for each of the \
+             logs in the set ([files.\"LOG.csv\"] payload = {{ mass = {}, at = [{x:?}, {y:?}, {z:?}] }})",
             known.mass, known.mass
         );
         payload = Some(Box::new(PlannedPayload { mass_kg: known.mass, at_m: [x, y, z], link }));
@@ -216,16 +215,16 @@ fn next(plan: &Plan, problem: &Problem) -> NextExperiment {
     sentence += &match (plan.separation, plan.without_payload) {
         (Some(apart), without) => {
             let without = without.map_or(String::new(), |w| format!(" (without the payload by {w:.1})"));
-            let little = if apart < 3.0 { "; that is little, and more playings of it are needed" } else { "" };
+            let little = if apart < 3.0 { "; that is little, so repeat the motion more often" } else { "" };
             let apart = if apart > 100.0 {
                 "more than 100 standard deviations".to_string()
             } else {
                 format!("{apart:.1} standard deviations or more")
             };
-            format!("Of the motions that were drawn it tells best {}: by {apart}{without}{little}.", between.join(", and "))
+            format!("Of the random motions tried it separates best {}: by {apart}{without}{little}.", between.join(", and "))
         }
         (None, _) => format!(
-            "Of the motions that were drawn it determines the inertial parameters and friction best (condition of the regressor {:.0}).",
+            "Of the random motions tried it determines the inertial parameters and friction best (condition of the regressor {:.0}).",
             plan.excitation.condition
         ),
     };

@@ -16,7 +16,7 @@ pub enum ArmError {
     #[error("{0}")]
     Bag(String),
     /// The model has no robot.
-    #[error("{0}: has no [robot], so it is no arm; a model of one axis is diagnosed from recordings of its inputs and outputs")]
+    #[error("{0}: has no [robot], so it is not an arm; a model of one axis is diagnosed from recordings of its inputs and outputs")]
     NoRobot(String),
     /// The robot cannot be computed.
     #[error("{0}")]

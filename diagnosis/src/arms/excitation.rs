@@ -107,7 +107,7 @@ fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> M
         velocity: Vec::new(),
         acceleration: Vec::new(),
         torque: Vec::new(),
-        told: Vec::new(),
+        recorded_velocity: Vec::new(),
         moves: Vec::new(),
         counts: Vec::new(),
         payload: None,

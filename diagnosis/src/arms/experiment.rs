@@ -109,7 +109,7 @@ fn questions(data: &Data, search: &Search) -> Vec<Question> {
     if out.is_empty() && best.structure.tolerance >= 2 && !several_payloads(&data.motions[..data.fit_count]) {
         // Where inertial parameters are as free as that, all torques may be read by a wrong factor as well.
         let terms = vec![(Term::new(Physics::Gain, At::Base, Vec::new()), vec![0.05])];
-        let between = ["all torque constants 5 % off".to_string(), "all masses 5 % off".to_string()];
+        let between = ["all torque constants wrong by 5 %".to_string(), "all masses wrong by 5 %".to_string()];
         out.push(Question { terms, rival: best.structure.clone(), between });
     }
     out

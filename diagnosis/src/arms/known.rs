@@ -19,7 +19,10 @@ impl Data<'_> {
         let used = self.elements_along().into_iter().filter(|one| !self.unused.iter().any(|unused| unused.name == one.name));
         let say = |one: Stated| {
             let kind = one.law.kind().name;
-            format!("\"{}\" ({kind}) counts along the measured motion with the parameters of the file; they are not refitted", one.name)
+            format!(
+                "\"{}\" ({kind}) is computed along the measured motion with the parameters of the file; they are not refitted",
+                one.name
+            )
         };
         used.map(say).collect()
     }

@@ -42,7 +42,7 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
             .iter()
             .map(|n| {
                 let joint =
-                    of(n).ok_or_else(|| fault(format!("says nothing of joint \"{n}\": add [joints.{n}] with position and torque")))?;
+                    of(n).ok_or_else(|| fault(format!("does not describe joint \"{n}\": add [joints.{n}] with position and torque")))?;
                 match joint.has_torque || joint.is_passive {
                     true => Ok(joint),
                     false => {
@@ -57,8 +57,8 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
         return Err(ArmError::Log {
             log: first.to_string(),
             message: format!(
-                "is a bag: say in set.toml for each of {all} which topics hold it, such as [joints.{one}] position = {{ topic = \"/joint_states\", field = \
-                 \"position[0]\" }}, torque = {{ topic = \"/joint_states\", field = \"effort[0]\" }}"
+                "is a bag: state in set.toml which topics hold each of {all}, such as [joints.{one}] position = {{ topic = \
+                 \"/joint_states\", field = \"position[0]\" }}, torque = {{ topic = \"/joint_states\", field = \"effort[0]\" }}"
             ),
         });
     }
@@ -91,8 +91,8 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
                 return Err(ArmError::Log {
                     log: first.to_string(),
                     message: format!(
-                        "no column looks like the {what} of joint \"{name}\" (such as \"{name}.{what}\"); it has {}; say which in set.toml: \
-                         [joints.{name}] position = \"...\", torque = \"...\"",
+                        "no column looks like the {what} of joint \"{name}\" (such as \"{name}.{what}\"); it has {}; state in set.toml \
+                         which one: [joints.{name}] position = \"...\", torque = \"...\"",
                         headings.join(", ")
                     ),
                 });
@@ -195,7 +195,7 @@ fn check_units(file: &str, recording: &Recording, joints: &[JointColumns], coord
         for (signal, kind) in expected {
             let Some((_, unit)) = recording.units.iter().find(|(name, unit)| *name == signal && unit.kind != kind) else { continue };
             let message = format!(
-                "\"{signal}\" is in {}, {}; expected {}: name another column or unit, or say scale in [joints.{}]",
+                "\"{signal}\" is in {}, {}; expected {}: name another column or unit, or set scale in [joints.{}]",
                 unit.name,
                 unit.kind.text(),
                 kind.text(),

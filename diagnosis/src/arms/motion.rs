@@ -108,7 +108,7 @@ pub struct Motion {
     /// Torque through the filter of the positions, N m or N.
     pub torque: Vec<Vec<f64>>,
     /// Rates from the drive, through the same filter.
-    pub told: Vec<Option<Vec<f64>>>,
+    pub recorded_velocity: Vec<Option<Vec<f64>>>,
     /// 1 while a joint moves, 0 where it hardly does: dry friction is then anything between its levels, and a regression learns nothing of it.
     pub moves: Vec<Vec<f64>>,
     /// 1 where the torque of a joint counts, 0 where it does not, as where it is clipped.
@@ -132,11 +132,21 @@ impl Motion {
             position.push(thin(q));
         }
         let torque = log.torque.iter().map(|s| thin(smooth(s))).collect();
-        let told = log.velocity.iter().map(|v| v.as_ref().map(|s| thin(smooth(s)))).collect();
+        let recorded_velocity = log.velocity.iter().map(|v| v.as_ref().map(|s| thin(smooth(s)))).collect();
         let smeared = rates.smeared();
         let moves = velocity.iter().zip(&log.position).map(|(v, q)| moving(v, resting(v, q, rates), smeared)).collect();
         let counts = position.iter().map(|q| vec![1.0; q.len()]).collect();
-        Motion { name: log.name.clone(), counts, position, velocity, acceleration, torque, told, moves, payload: log.payload.clone() }
+        Motion {
+            name: log.name.clone(),
+            counts,
+            position,
+            velocity,
+            acceleration,
+            torque,
+            recorded_velocity,
+            moves,
+            payload: log.payload.clone(),
+        }
     }
 
     /// Samples.

@@ -110,7 +110,7 @@ impl Problem {
         for (index, body) in model.bodies.iter().enumerate() {
             match of_body(index) {
                 Some(joint) => armature[joint] += body.inertia,
-                None => notes.push(format!("body \"{}\" hangs on no joint and is left aside by the regression", body.name)),
+                None => notes.push(format!("body \"{}\" is attached to no joint and is ignored by the regression", body.name)),
             }
         }
         let (mut given, mut stated, mut unused) = (Vec::new(), Vec::new(), Vec::new());
@@ -124,7 +124,7 @@ impl Problem {
                 [(joint, sign)] if ends.len() == 1 => given.push(Given { name, element: index, joint: *joint, sign: *sign, law }),
                 [(a, _), (b, _)] if a == b => {
                     geared[*a] = true;
-                    notes.push(format!("the regression takes \"{name}\" as rigid; the simulation has it"));
+                    notes.push(format!("the regression treats \"{name}\" as rigid; the simulation includes it"));
                 }
                 [_, _] => stated.push(Stated { name, ends: on, law }),
                 _ if ends.is_empty() => {}

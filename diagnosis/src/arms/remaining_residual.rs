@@ -146,10 +146,10 @@ fn shows(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>) -> Option<
     let worst = data.blocks.iter().filter(|b| b.motion == longest).max_by(|a, b| square(a).total_cmp(&square(b)))?;
     let time = vec![[worst.rows.start, worst.rows.end].map(|row| data.rates.time_of(row))];
     let state = state.unwrap_or_else(|| {
-        let pace = if correlation > SLOW * own { "slow" } else { "as fast as noise that is filtered, such as by the drive" };
+        let pace = if correlation > SLOW * own { "slow" } else { "as fast as filtered noise, such as from the drive" };
         match independent < 2.0 * CLASSES as f64 {
-            true => format!("{pace}; the logs are too short to tell what it follows"),
-            false => format!("{pace}, and follows no position, velocity, acceleration or torque of a joint"),
+            true => format!("{pace}; the logs are too short to show what it correlates with"),
+            false => format!("{pace}, and correlates with no position, velocity, acceleration or torque of a joint"),
         }
     });
     Some(Where { time, band_hz, state: Some(state), class: None })
@@ -175,7 +175,7 @@ fn state(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>, independen
                 .collect();
             let share = explained(&residual, &signal, independent);
             if best.as_ref().is_none_or(|(most, _)| share > *most) {
-                best = Some((share, format!("follows the {what} of {name}")));
+                best = Some((share, format!("correlates with the {what} of {name}")));
             }
         }
     }

@@ -25,7 +25,7 @@ pub fn unexplained(joint: &ArmJoint) -> Option<String> {
     let state = state.as_deref().unwrap_or_default();
     let (share, noise) = (joint.moving?, joint.noise?);
     Some(format!(
-        "at {} {:.1} % of the torque while it moves (the sensors' noise would be {:.1} %): {state}; nine tenths of it lie below {}",
+        "at {} {:.1} % of the torque during motion (sensor noise: {:.1} %): {state}; 90 % of its power is below {}",
         joint.joint,
         100.0 * share,
         100.0 * noise,
@@ -49,11 +49,11 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
     let unseen = if held { "held-out" } else { "fitted" };
     let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
-    let tail = format!("of the {unseen} torque {} remain, joint by joint", left.join(", "));
+    let tail = format!("of the {unseen} torque {} remain unexplained (by joint)", left.join(", "));
     let open: Vec<String> = arm.joints.iter().filter_map(unexplained).collect();
-    let mut besides = if open.is_empty() { String::new() } else { format!(" Nothing that was tried explains {}.", open.join("; ")) };
+    let mut besides = if open.is_empty() { String::new() } else { format!(" No tested effect explains {}.", open.join("; ")) };
     if !unsigned.is_empty() {
-        besides += &format!(" Nothing is claimed at {}, whose torque was logged without its sign.", unsigned.join(", "));
+        besides += &format!(" Nothing is claimed at {}: its torque was logged without its sign.", unsigned.join(", "));
     }
     match word {
         Word::Missing => format!("The model leaves out {}; {tail} ({} without).{besides}", named.join(", "), before.join(", ")),
@@ -63,24 +63,25 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
             let open = match other {
                 Some(a) => {
                     let other = format!("{} {}", words(&a.physics), crate::verdict::words::place(&a.place));
-                    format!("leaves out {named}, or in place of the first {other}, which these logs do not tell apart")
+                    format!("leaves out {named}, or {other} instead of the first, which these logs do not separate")
                 }
-                None => format!("may leave out {named}, which held-out torque or a simulation in closed loop does not bear out"),
+                None => format!("may leave out {named}, but held-out torque or a closed-loop simulation does not confirm it"),
             };
             format!("The model {open}; {tail} ({} without).{besides}", before.join(", "))
         }
-        Word::Unexplained => format!("Something is missing that no physics tried explains: {}.", open.join("; ")),
-        Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),
+        Word::Unexplained => format!("An effect is missing that none of the tested effects explains: {}.", open.join("; ")),
+        Word::Parameters => format!("No effect is missing; the model's parameters are wrong, and refitted {tail}."),
         Word::CannotTell if !unsigned.is_empty() => {
             let which = unsigned.join(", ");
             format!(
-                "What is missing cannot be told: the torque of {which} was logged without its sign. Log the signed torque or current; {tail}."
+                "It is not known what is missing: the torque of {which} was logged without its sign. Log the signed torque or current; \
+                    {tail}."
             )
         }
         Word::CannotTell => format!("The search was interrupted before anything was found; {tail}."),
         Word::NothingMissing => {
             let noise: Vec<String> = arm.joints.iter().filter_map(|j| Some(format!("{:.1} %", 100.0 * j.noise?))).collect();
-            format!("Nothing that these logs would show is missing; {tail} (the sensors' noise would be {}).", noise.join(", "))
+            format!("No effect that these logs would show is missing; {tail} (sensor noise: {}).", noise.join(", "))
         }
     }
 }

@@ -67,7 +67,8 @@ pub fn torque(stated: &Stated, motion: &Motion, pose: &[f64], period: f64) -> Re
         resolution: 0.0,
         noise: 0.0,
     });
-    let mut found = simulate(&model, &[path], period, &Options::default()).map_err(|e| format!("it cannot be simulated by itself: {e}"))?;
+    let mut found =
+        simulate(&model, &[path], period, &Options::default()).map_err(|e| format!("it cannot be simulated separately: {e}"))?;
     let torque = found.pop().unwrap_or_default();
     match torque.len() == motion.len() && torque.iter().all(|x| x.is_finite()) {
         true => Ok(torque),

@@ -99,7 +99,7 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
         (true, _) => arm.xml.clone(),
         (false, true) => {
             notes.push(
-                "the robot file has joints whose reference is not 0, which a URDF cannot say: its inertias are written as they were"
+                "the robot file has joints whose reference is not 0, which URDF does not support: its inertias are written unchanged"
                     .to_string(),
             );
             robot = problem.robot.clone();
@@ -111,7 +111,8 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
         }
         (false, false) => {
             notes.push(
-                "the robot is written as a URDF, for its inertias are others: geoms, sites and what else its MJCF has besides bodies and joints are not in it"
+                "the robot is written as URDF because its inertias changed: it contains bodies and joints, but no geoms, sites or other \
+                    elements of the MJCF"
                     .to_string(),
             );
             backdrive_export::urdf::robot_as_urdf(&robot)
@@ -184,7 +185,7 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         }
         if value(Physics::LoadFriction).is_some_and(|c| c > 0.0) && value(Physics::Stribeck).is_some() {
             notes.push(format!(
-                "friction of joint {} is written without its excess at rest: no element has load and speed at once",
+                "friction of joint {} is written without its excess at rest: no element depends on both load and speed",
                 problem.joints[joint]
             ));
         }
@@ -233,7 +234,7 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
             }
         }
         if term.physics == Physics::Delay {
-            notes.push("the delay is one of the torque as it was logged; the model has it not".to_string());
+            notes.push("the delay is one of the logged torque; the model does not contain it".to_string());
         }
     }
 }
@@ -287,10 +288,14 @@ fn rotor(model: &mut Model, joint: usize, body: usize, name: &str, gear: &Gear, 
     model.inputs.iter_mut().filter(|i| i.on == body && i.kind == backdrive_plant::model::InputKind::Force).for_each(|i| i.on = at);
     match (gear.compliance, gear.gap) {
         (None, None) => {
-            notes.push(format!("joint {} has a stiff spring ({STIFF_HZ} Hz) before it, through which the load of its friction passes", joint + 1));
+            notes.push(format!(
+                "joint {} is driven through a stiff spring ({STIFF_HZ} Hz), which measures the load for its friction",
+                joint + 1
+            ));
         }
         _ => notes.push(format!(
-            "in the diagnosed model the motor of joint {name} is the body \"{name}.rotor\": the logged position is taken for the motor's, as a sensor before the gear has it"
+            "in the diagnosed model the motor of joint {name} is the body \"{name}.rotor\": the logged position is assumed to be measured \
+                at the motor, before the gear"
         )),
     }
     at

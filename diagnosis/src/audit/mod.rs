@@ -67,7 +67,7 @@ pub fn usable(problem: &Problem) -> Result<(), String> {
     if !(0..model.outputs.len()).any(moves) {
         let names: Vec<&str> = model.outputs.iter().map(|o| o.name.as_str()).collect();
         let them = names.join(", ");
-        return Err(format!("{first}: {them} is constant in every recording: the sensor is dead, or the column is another one"));
+        return Err(format!("{first}: {them} is constant in every recording: the sensor is dead, or the wrong column is named"));
     }
     if let Some(text) = rates::unit_of_time(problem) {
         return Err(text);

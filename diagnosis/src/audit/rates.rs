@@ -28,10 +28,11 @@ pub fn rates(problem: &Problem) -> Result<(), String> {
     let unit = UNITS.iter().find(|(unit, _)| (ratio * unit).max(1.0 / (ratio * unit)) < tuning().recordings.unit_near);
     let advice = match unit {
         Some((unit, word)) => format!(
-            "its time looks like {word}: say t = {{ column = \"t\", scale = {unit:e} }} under [columns] of a set.toml for these files, or convert it"
+            "its time looks like {word}: write t = {{ column = \"t\", scale = {unit:e} }} under [columns] of a set.toml for these files, \
+                or convert it"
         ),
-        None => "what the input does between the slow samples is not known: record all at one rate, diagnose them apart, or say \
-                 mixed_rates = true in set.toml if the slow input really is held between its samples"
+        None => "the input between the slow samples is unknown. Record all at one rate, diagnose them separately, or set mixed_rates = \
+                 true in set.toml if the slow input really is held between samples"
             .to_string(),
     };
     Err(format!(
@@ -52,8 +53,9 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
         && left < 1.0 - tuning().recordings.unit_correlates * tuning().recordings.unit_correlates;
     better.then(|| {
         format!(
-            "{}: has a sample every {:.4} s, and the model does not move like that; read as {word} it explains {:.0} % of the motion's variance \
-             in place of {:.0} %: say t = {{ column = \"t\", scale = {unit:e} }} under [columns] of set.toml, or convert the column to seconds",
+            "{}: has a sample every {:.4} s, which does not fit the model. Read as {word} it explains {:.0} % of the motion's variance \
+             instead of {:.0} %. Write t = {{ column = \"t\", scale = {unit:e} }} under [columns] of set.toml, or convert the column to \
+             seconds",
             file_name(&record.name),
             record.period,
             100.0 * (1.0 - left),

@@ -11,7 +11,7 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
     clock(record, all);
     for found in &record.outliers {
         let what = if found.count == 1 { "one sample is".to_string() } else { format!("{} samples are", found.count) };
-        let done = if found.replaced { "put between the neighbours" } else { "left as they are; check the file" };
+        let done = if found.replaced { "interpolated from the neighbours" } else { "kept unchanged; check the file" };
         let text = format!(
             "{what} far from the neighbours, the first after {:.4} s by {:.0} times the signal's range: {done}",
             found.first, found.size
@@ -25,14 +25,14 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
         constant(record, &input.name, samples, all);
         if let (InputKind::Motion, Some(step)) = (input.kind, crate::recordings::noise::step_of(samples)) {
             let text = format!(
-                "drives the model and moves in steps of {step:.4e}: differentiated twice, each is an acceleration of {:.1e} for a sample; what that does to \
-                 the forces counts as noise of theirs",
+                "drives the model and has a resolution of {step:.4e}: after two differentiations each step is an acceleration of {:.1e} \
+                 for one sample. Its effect on the forces is counted as force noise",
                 step / (record.period * record.period)
             );
             add(all, Weight::Caution, record, &input.name, "encoder", text);
         }
         if input.kind == InputKind::Force {
-            clipped(record, &input.name, samples, "its source may be limited", all);
+            clipped(record, &input.name, samples, "its source may saturate", all);
         }
     }
     for (output, samples) in problem.model.outputs.iter().zip(&record.outputs) {
@@ -42,7 +42,7 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
                 constant(record, &output.name, samples, all);
                 sensor(record, &output.name, output.resolution, samples, all);
                 if !matches!(output.kind, OutputKind::Position(_)) {
-                    clipped(record, &output.name, samples, "its sensor may be at the end of its range", all);
+                    clipped(record, &output.name, samples, "its sensor may saturate", all);
                 }
             }
         }
@@ -63,25 +63,18 @@ fn clock(record: &Record, all: &mut Vec<Remark>) {
             ),
             None => format!("samples are up to {:.1} ms off an even clock of {:.3} ms", 1e3 * jitter.largest, 1e3 * record.period),
         };
-        add(
-            all,
-            Weight::Caution,
-            record,
-            "",
-            "clock",
-            format!("the clock is irregular: {gaps}; it is simulated on the times that were logged"),
-        );
+        add(all, Weight::Caution, record, "", "clock", format!("the clock is irregular: {gaps}; the simulation uses the logged times"));
     } else if !jitter.gaps.is_empty() {
         let missing: usize = jitter.gaps.iter().map(|g| g.missing).sum();
         let text = format!(
-            "{missing} samples are missing in {} gaps, the first after {:.4} s; they are filled in as the input's hold says",
+            "{missing} samples are missing in {} gaps, the first after {:.4} s; they are filled according to the input's hold",
             jitter.gaps.len(),
             jitter.gaps[0].after
         );
         add(all, Weight::Caution, record, "", "gaps", text);
     } else if jitter.largest > tuning().recordings.jitter * record.period {
         let text = format!(
-            "the clock is off its grid by {:.1} % of a sample rms and {:.0} % at worst; delays below that are not claimed",
+            "the clock is off its grid by {:.1} % of a sample rms and {:.0} % at worst; smaller delays are not claimed",
             100.0 * jitter.rms / record.period,
             100.0 * jitter.largest / record.period
         );
@@ -92,7 +85,7 @@ fn clock(record: &Record, all: &mut Vec<Remark>) {
 fn constant(record: &Record, name: &str, samples: &[f64], all: &mut Vec<Remark>) {
     if is_constant(samples) {
         let value = samples.first().copied().unwrap_or(0.0);
-        add(all, Weight::Caution, record, name, "constant", format!("is {value} throughout: it says nothing"));
+        add(all, Weight::Caution, record, name, "constant", format!("is constant at {value}: it contains no information"));
     }
 }
 
@@ -108,22 +101,24 @@ fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Ve
 fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut Vec<Remark>) {
     match crate::recordings::noise::step_of(samples) {
         Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > tuning().recordings.grid => {
-            let text = format!("moves in steps of {step:.4e}, the model says {stated:.4e}");
+            let text = format!("has a resolution of {step:.4e}; the model states {stated:.4e}");
             add(all, Weight::Caution, record, name, "encoder", text);
         }
-        Some(step) if stated == 0.0 => add(all, Weight::Note, record, name, "encoder", format!("moves in steps of {step:.4e}")),
+        Some(step) if stated == 0.0 => add(all, Weight::Note, record, name, "encoder", format!("has a resolution of {step:.4e}")),
         Some(_) => {}
         None => {
             if stated > 0.0 && off_grid(samples, stated) {
-                let text =
-                    format!("is not on the grid of {stated:.4e} that the model says: it was filtered or converted before it was recorded");
+                let text = format!(
+                    "is not quantised to the {stated:.4e} that the model states: it was filtered or converted before it was \
+                        recorded"
+                );
                 add(all, Weight::Caution, record, name, "filtered", text);
             }
             if let Some(share) = quiet_top(samples)
                 && share < tuning().recordings.quiet_top
             {
-                let text = "has nothing in the upper part of its band, not even noise: it was low-pass filtered before it was recorded, \
-                            or simulated; fast effects (delay, bandwidth) may be the filter's"
+                let text = "has no power in the upper part of its band, not even noise: it was low-pass filtered before recording, or \
+                            simulated. A delay or bandwidth found here may belong to the filter"
                     .to_string();
                 add(all, Weight::Caution, record, name, "filtered", text);
             }

@@ -16,7 +16,7 @@ pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
             continue;
         }
         let spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
-        let text = format!("its measuring error is {noise_sd:.2e}, {:.3} % of what it moves", 100.0 * noise_sd / spread);
+        let text = format!("its sensor noise is {noise_sd:.2e}, {:.3} % of its range of motion", 100.0 * noise_sd / spread);
         let weight = if noise_sd / spread > tuning().recordings.noisy { Weight::Caution } else { Weight::Note };
         all.push(Remark { weight, records: Vec::new(), signal: output.name.clone(), about: "noise", text });
     }
@@ -36,9 +36,12 @@ pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
             None => file_name(&other.name).to_string(),
         };
         let (text, weight) = if times > tuning().recordings.repeats {
-            (format!("repeats {what} to {apart:.2e} only, {times:.1} times its noise: no model can do better"), Weight::Caution)
+            (
+                format!("repeats {what} only to within {apart:.2e}, {times:.1} times its noise: no model can predict it better"),
+                Weight::Caution,
+            )
         } else {
-            (format!("repeats {what} to its noise"), Weight::Note)
+            (format!("repeats {what} to within its noise"), Weight::Note)
         };
         add(&mut all, weight, own, &name.name, "repeats", text);
     }
@@ -57,7 +60,8 @@ pub(super) fn closed_loop(problem: &Problem, all: &mut Vec<Remark>) {
                 let found = answers(u, y);
                 if found > tuning().recordings.closed_loop {
                     let text = format!(
-                        "follows the noise of {} (correlation {found:.2}): a controller closes the loop, and hides what it can reject",
+                        "follows the noise of {} (correlation {found:.2}): a controller closes the loop and hides the disturbances that \
+                            it rejects",
                         output.name
                     );
                     add(all, Weight::Note, record, &input.name, "loop", text);

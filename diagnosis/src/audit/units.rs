@@ -45,7 +45,8 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
         let remark = |weight, about, text| Remark { weight, records: Vec::new(), signal: output.name.clone(), about, text };
         if factors.iter().all(|f| *f < 0.0) {
             let text = format!(
-                "has the other sign than the model says (correlation -{least:.2}): turn it by scale = -1.0 under [columns] of set.toml, or an input"
+                "has the opposite sign of the model (correlation -{least:.2}): set scale = -1.0 for it under [columns] of set.toml, or \
+                    for an input"
             );
             all.push(remark(Weight::Caution, "sign", text));
         }
@@ -55,12 +56,14 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
         let near = |f: f64| (size / f).max(f / size) < tuning().recordings.unit_near;
         let text = match known(&output.kind, problem.model.motion).iter().find(|k| near(k.0)) {
             Some((f, unit)) => format!(
-                "is {} times what the model says, at a correlation of {least:.2}: its values look like {unit}; say scale = {} for it under [columns] of set.toml",
+                "is {} times the model's output, at a correlation of {least:.2}: its values look like {unit}; set scale = {} for it under \
+                    [columns] of set.toml",
                 rounded(size),
                 rounded(1.0 / f)
             ),
             None => format!(
-                "is {} times what the model says, at a correlation of {least:.2}: a unit is wrong, here or at an input; say scale = ... under [columns] of set.toml",
+                "is {} times the model's output, at a correlation of {least:.2}: a unit is wrong, here or at an input; set scale = ... \
+                    under [columns] of set.toml",
                 rounded(size)
             ),
         };

@@ -52,13 +52,15 @@ pub(super) fn contradictions(problem: &Problem) -> Vec<Contradiction> {
         let is_both = scaled && shifted;
         let todo = match is_both || shifted {
             false => format!(
-                "{name} is left out, and computed from {of} where it is needed; where {of} is right, say scale = {} times what it is for {name} under [columns] of set.toml",
+                "{name} is ignored, and computed from {of} where needed; if {of} is right, set scale to {} times its present value for \
+                    {name} under [columns] of set.toml",
                 round_significant(1.0 / gain, 3)
             ),
             true if is_both => format!(
-                "one of the two is not what its name says: find out which, and leave that column out with --ignore-signal {name} or --ignore-signal {of}"
+                "one of the two columns is mislabelled: find out which, and leave it out with --ignore-signal {name} or --ignore-signal \
+                    {of}"
             ),
-            true => format!("{name} is left out, and computed from {of} where it is needed"),
+            true => format!("{name} is ignored, and computed from {of} where needed"),
         };
         let text = format!("{}: {todo}", parts.join(", and "));
         Some(Contradiction { output: velocity, text, is_both, file: file_name(&first.0.name).to_string() })

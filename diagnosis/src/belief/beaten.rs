@@ -45,8 +45,8 @@ impl Why {
             Why::Claimed => "claimed",
             Why::ExplainsLess => "explains less",
             Why::PredictsWorse => "fits better, predicts worse",
-            Why::NotWorthIts => "no better than what has fewer parameters",
-            Why::NotSure => "better, but not surely enough or not by enough to be claimed",
+            Why::NotWorthIts => "no better than a law with fewer parameters",
+            Why::NotSure => "better, but not significantly enough to be claimed",
         }
     }
 }

@@ -125,14 +125,14 @@ impl PerRecord {
     /// In one sentence.
     pub fn sentence(&self) -> String {
         if self.records.len() < 2 {
-            return "there is one record only: nothing to hold its parameters against".to_string();
+            return "there is one record only: its parameters cannot be compared with others".to_string();
         }
         match self.disagreements().as_slice() {
             [] => {
                 let (records, compared, all) = (self.records.len(), self.compared(), self.numbers.len());
                 match compared {
                     0 => format!(
-                        "whether the {records} records agree cannot be told: none of the {all} parameters is determined by two of them"
+                        "it is not known whether the {records} records agree: none of the {all} parameters is determined by two of them"
                     ),
                     _ if compared == all => format!("the {records} records agree within their errors in all {all} parameters"),
                     _ => format!(
@@ -145,7 +145,7 @@ impl PerRecord {
             all => {
                 let names: Vec<&str> = all.iter().take(3).map(|n| n.name.as_str()).collect();
                 let more = if all.len() > 3 { format!(" and {} more", all.len() - 3) } else { String::new() };
-                format!("the records disagree in {}{more}: the structure is not the device's", names.join(", "))
+                format!("the records disagree in {}{more}: the model structure is wrong", names.join(", "))
             }
         }
     }
@@ -171,7 +171,7 @@ mod tests {
         let of = |numbers| PerRecord { records: vec!["a".to_string(), "b".to_string()], levels: Vec::new(), numbers };
         let none = of(vec![across(false), across(false)]);
         assert_eq!((none.compared(), none.agree()), (0, None));
-        assert!(none.sentence().contains("cannot be told: none of the 2 parameters"), "{}", none.sentence());
+        assert!(none.sentence().contains("none of the 2 parameters"), "{}", none.sentence());
         let some = of(vec![across(true), across(false), across(false)]);
         assert!(some.sentence().contains("1 of 3 parameters") && some.sentence().contains("other 2 cannot"), "{}", some.sentence());
         assert_eq!(some.agree(), Some(true));

@@ -11,7 +11,7 @@ use crate::recordings::problem::Problem;
 use crate::tuning::tuning;
 use backdrive_signal::statistics::rms;
 
-/// The excitation that determines parameters of a structure which the recordings do not determine. `numbers` are places among [`Structure::free`], `told`
+/// The excitation that determines parameters of a structure which the recordings do not determine. `numbers` are places among [`Structure::free`], `before`
 /// the reported standard deviation of each parameter, in the fit's own unit. It is wider than that of the sensors' noise alone where residuals are
 /// correlated or models differ; an experiment is assumed to reduce it by the same factor. What exceeds the budget is not tried.
 ///
@@ -22,13 +22,13 @@ pub fn excite<'a>(
     structure: &Structure,
     values: &[f64],
     numbers: &[usize],
-    told: &[f64],
+    before: &[f64],
     noise_sd: &[f64],
     budget: &Budget<'a>,
 ) -> Result<Experiment, Reason> {
     let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.free.get(*j).is_some_and(|n| n.records.is_none())).collect();
-    if numbers.is_empty() || values.len() != structure.free.len() || told.len() != values.len() {
-        return Err(Reason("there is no number to determine".to_string()));
+    if numbers.is_empty() || values.len() != structure.free.len() || before.len() != values.len() {
+        return Err(Reason("there is no parameter to determine".to_string()));
     }
     let model = structure.model(problem, values).ok_or_else(|| Reason("the model cannot be simulated".to_string()))?;
     let planner = Planner::new(problem, noise_sd, budget)?;
@@ -38,14 +38,13 @@ pub fn excite<'a>(
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
     // The reported standard deviation, divided by the one caused by the sensors' noise alone.
-    let ratio = |(own, told): (&f64, &f64)| Some(told / own).filter(|ratio| ratio.is_finite() && *ratio > 0.0).unwrap_or(1.0);
-    let wider: Vec<f64> = known.deviations(None).iter().zip(told).map(ratio).collect();
-    let before = told;
+    let ratio = |(own, before): (&f64, &f64)| Some(before / own).filter(|ratio| ratio.is_finite() && *ratio > 0.0).unwrap_or(1.0);
+    let wider: Vec<f64> = known.deviations(None).iter().zip(before).map(ratio).collect();
     let whole = |j: usize| if structure.free[j].log { 1.0 } else { own[j].abs() };
     let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > tuning().experiment.open * whole(*j)).collect();
     if numbers.is_empty() {
         return Err(Reason(format!(
-            "the recordings determine all of these numbers with a standard deviation of {} % or less",
+            "the recordings determine all these parameters with a standard deviation of {} % or less",
             short(100.0 * tuning().experiment.open)
         )));
     }
@@ -68,7 +67,7 @@ pub fn excite<'a>(
     let Some((case, separation, after)) = best.filter(|g| g.1 >= least) else {
         let list = names.join(", ");
         return Err(Reason(format!(
-            "no excitation within the range of the recordings determines {list}: it takes larger amplitudes, another sensor or another input"
+            "no excitation within the range of the recordings determines {list}: use larger amplitudes, another sensor or another input"
         )));
     };
     let case = &cases[*case];
@@ -82,7 +81,7 @@ pub fn excite<'a>(
         }
     });
     let sentence = format!(
-        "Play {}: it determines {}, which the recordings leave open.",
+        "Play {}: it determines {}, which the recordings do not determine.",
         described(&model, &case.trial),
         accuracy.collect::<Vec<_>>().join(", ")
     );

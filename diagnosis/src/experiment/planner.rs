@@ -163,7 +163,7 @@ impl<'a> Planner<'a> {
     ) -> Result<Experiment, Reason> {
         let (a, b) = (&rivals[a], &rivals[b]);
         let [one, other] = words::names(a.structure, b.structure);
-        let mut said = format!("No excitation tells {one} and {other} apart with the sensors there are");
+        let mut said = format!("No excitation separates {one} and {other} with the present sensors");
         if same(a.structure, b.structure) {
             said.push_str(&format!(": {}", words::same_force(a.structure, b.structure)));
         } else {
@@ -179,7 +179,7 @@ impl<'a> Planner<'a> {
             best.filter(|s| s.separation >= tuning().experiment.wanted).and_then(|s| Some((s.clone(), *spread.get(s.trial)?)))
         else {
             if !directed {
-                said.push_str("; nor does any further sensor of position, velocity or element force");
+                said.push_str("; an additional sensor of position, velocity or element force does not help");
             }
             return Err(Reason(format!("{said}.")));
         };
@@ -217,7 +217,8 @@ impl<'a> Planner<'a> {
         let repeats = repeats(separation);
         let again = if repeats > 1 { format!(", {repeats} times") } else { String::new() };
         let mut sentence = format!(
-            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} noise standard deviations rms, most of it in {output}), {}",
+            "Play {}{again}: the predictions of {one} and {other} then differ by {} standard deviations ({} noise standard deviations \
+                rms, mostly in {output}), {}",
             words::described(&self.setup.problem.model, &case.trial),
             short(separation * f64::from(repeats).sqrt()),
             short(level),
@@ -229,7 +230,7 @@ impl<'a> Planner<'a> {
         sentence.push('.');
         if let Some(Pair { a: c, b: d, .. }) = inseparable {
             let [one, other] = words::names(rivals[c].structure, rivals[d].structure);
-            sentence.push_str(&format!(" It does not tell {one} and {other} apart."));
+            sentence.push_str(&format!(" It does not separate {one} and {other}."));
         }
         let between = rivals.iter().map(|r| r.structure.name()).collect();
         self.experiment(case, sentence, between, separation, &difference, level)

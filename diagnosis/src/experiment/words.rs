@@ -130,29 +130,29 @@ pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
     use Mark::*;
     let pair = |p: Mark, q: Mark| (x == p && y == q) || (x == q && y == p);
     let said = match () {
-        () if x == y && !same_place => "the same physics loads other bodies there, and each of these has its own frequency",
-        () if pair(Dry, Viscous) => "dry friction is the same at every speed, viscous friction grows with it: two speeds tell",
-        () if pair(Dry, Drag) || pair(Viscous, Drag) => "drag grows with the square of the speed: two speeds tell",
-        () if pair(Dry, NearRest) => "what friction does near rest shows in slow motion",
+        () if x == y && !same_place => "the same effect at another place loads other bodies, and each has its own resonance",
+        () if pair(Dry, Viscous) => "dry friction is the same at every speed, viscous friction grows with speed: two speeds separate them",
+        () if pair(Dry, Drag) || pair(Viscous, Drag) => "drag grows with the square of the speed: two speeds separate them",
+        () if pair(Dry, NearRest) => "friction near rest shows in slow motion",
         () if pair(Dry, Presliding) || pair(NearRest, Presliding) => {
-            "presliding gives way over a distance from each reversal, dry friction jumps with the velocity"
+            "presliding friction rises over a distance after each reversal, dry friction jumps with the sign of the velocity"
         }
-        () if pair(Presliding, Memory) => "reversals within reversals show how much of the past the force remembers",
+        () if pair(Presliding, Memory) => "reversals within reversals show the memory of the force",
         () if pair(Dry, Gap) || pair(Presliding, Gap) => {
-            "in a gap nothing pulls, and small motion stays within it; friction is there at any amplitude"
+            "a gap transmits no force, and small motion stays within it; friction acts at any amplitude"
         }
         () if pair(Delay, Gap) || pair(Lag, Gap) => "the lag of a gap falls with the amplitude, that of a delay grows with the frequency",
-        () if pair(Delay, Lag) => "a delay turns the phase and leaves the gain, a lag takes the gain too: high frequencies tell",
-        () if pair(Delay, Mass) || pair(Lag, Mass) => "inertia takes gain and turns no phase by itself; a lag turns the phase",
+        () if pair(Delay, Lag) => "a delay changes only the phase, a lag also lowers the gain: high frequencies separate them",
+        () if pair(Delay, Mass) || pair(Lag, Mass) => "inertia lowers the gain without a phase change; a lag changes the phase",
         () if pair(Delay, Soft) || pair(Lag, Soft) => "a compliance brings a resonance, a lag does not",
         () if pair(Limit, Shape) => {
-            "a limit of the drive belongs to the command, a softening spring to the displacement: several amplitudes tell"
+            "a limit of the drive depends on the command, a softening spring on the displacement: several amplitudes separate them"
         }
-        () if pair(Lopsided, Bias) => "an offset is there at rest and at every speed, lopsided friction has the sign of the motion",
-        () if pair(Ripple, Dry) || pair(Ripple, Bias) => "a ripple keeps its place in both directions",
-        () if pair(Dry, Lopsided) => "lopsided friction is another in each direction: motion both ways about a bias tells",
+        () if pair(Lopsided, Bias) => "an offset acts at rest and at every speed, asymmetric friction changes sign with the motion",
+        () if pair(Ripple, Dry) || pair(Ripple, Bias) => "a ripple depends on position, in both directions alike",
+        () if pair(Dry, Lopsided) => "asymmetric friction differs by direction: motion both ways about a bias separates them",
         () if [Spring, Shape, Mass, Soft, Limit].iter().any(|other| pair(Dry, *other)) => {
-            "dry friction does not grow with the motion: several amplitudes tell"
+            "dry friction does not grow with the motion: several amplitudes separate them"
         }
         () => return None,
     };

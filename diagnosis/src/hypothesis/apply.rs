@@ -221,7 +221,7 @@ fn remove(model: &mut Model, name: &str) -> Result<(), String> {
     for output in &mut model.outputs {
         if let OutputKind::Force(read) = &mut output.kind {
             if read.contains(&gone) {
-                return Err(format!("output \"{}\" reads element \"{name}\", which cannot go", output.name));
+                return Err(format!("output \"{}\" reads element \"{name}\", which cannot be removed", output.name));
             }
             read.iter_mut().filter(|index| **index > gone).for_each(|index| *index -= 1);
         }

@@ -5,7 +5,7 @@ use backdrive_plant::elements::Kind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a physics belongs to.
+/// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
@@ -251,7 +251,7 @@ impl Physics {
     pub fn state_at(&self, place: &str) -> String {
         match (self.state, self.against) {
             (State::Reversals, _) => format!("reversals of the velocity across {place}"),
-            (State::Contact, _) => format!("where the displacement across {place} meets or leaves its contact"),
+            (State::Contact, _) => format!("where the displacement across {place} makes or breaks contact"),
             (State::Large, _) => format!("large values of {place}"),
             (State::Periodic, _) => format!("periodically in the displacement across {place}"),
             (State::WithItsVariable, Against::Velocity) => format!("with the velocity across {place}"),

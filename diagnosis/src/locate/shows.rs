@@ -133,7 +133,7 @@ fn describe(candidate: &Candidate) -> String {
     let Some(law) = candidate.laws.first() else { return format!("a force at {place}") };
     let what = match law.variable {
         Variable::Constant => "constantly",
-        Variable::Direction => "with the direction of motion, so at its reversals",
+        Variable::Direction => "with the direction of motion, at its reversals",
         Variable::Velocity => "with velocity",
         Variable::Displacement => "with displacement",
         Variable::Acceleration => "with acceleration",

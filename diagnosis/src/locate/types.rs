@@ -85,7 +85,7 @@ pub enum LocateError {
         samples: usize,
     },
     /// The model left all bounds.
-    #[error("{run}: the model's motion grows beyond all bounds; refit it first")]
+    #[error("{run}: the model's motion diverges; refit it first")]
     Diverged {
         /// The recording.
         run: String,
@@ -108,7 +108,10 @@ pub enum LocateError {
         expected: usize,
     },
     /// The linear part of the model has no finite equations.
-    #[error("the equations of the model's linear part are singular; a body has no inertia, or numbers are too far apart")]
+    #[error(
+        "the equations of the model's linear part are singular; a body has no inertia, or parameters differ by too many orders of \
+        magnitude"
+    )]
     Singular,
 }
 

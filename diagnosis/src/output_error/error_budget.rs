@@ -3,7 +3,7 @@
 use crate::belief::statistics::levels;
 use crate::output_error::candidate::Candidate;
 use crate::output_error::evaluator::{Evaluator, measured};
-use crate::output_error::hold::Told;
+use crate::output_error::hold::HoldEvidence;
 use crate::output_error::simulate::{TWICE, predict};
 use crate::recordings::noise::{step_of, white};
 use crate::recordings::problem::{Problem, Record};
@@ -30,7 +30,7 @@ pub enum Source {
     Hold,
     /// Noise and rounding of a motion that drives the model: what another noise of the same size changes.
     DrivingMotion,
-    /// A velocity in steps, which is the difference of an encoder's counts: their mean over a sample in the place of the velocity at its middle.
+    /// A velocity computed from encoder counts: the mean over a sample period instead of the velocity at its middle.
     Differencing,
 }
 
@@ -46,7 +46,7 @@ pub struct BudgetedError {
 }
 
 /// Every error of the predictions of a fitted structure; `holds` is its evidence on inputs between their samples.
-pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -> Vec<BudgetedError> {
+pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[HoldEvidence]) -> Vec<BudgetedError> {
     let (structure, values) = (&fitted.structure, &fitted.fit.values);
     let (problem, noise_sd) = (evaluator.problem, &evaluator.noise_sd);
     let mut all = Vec::new();
@@ -61,8 +61,8 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
         let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
         add(Source::Integration, levels(evaluator, &apart));
     }
-    for told in holds {
-        add(Source::Hold, told.unknown());
+    for evidence in holds {
+        add(Source::Hold, evidence.unknown());
     }
     let relative = |errors: Vec<f64>| errors.iter().zip(noise_sd).map(|(error, sd)| error / sd).collect();
     add(Source::Clock, relative(clock(problem)));

@@ -57,9 +57,9 @@ pub fn linear(problem: &Problem, inputs: &[usize]) -> Problem {
     other
 }
 
-/// What the recordings say of an input that is assumed to be held.
+/// The evidence on an input that is assumed to be held between samples.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct HoldEvidence {
     /// The input.
     pub input: usize,
     /// What a straight line between samples changes at each output, root mean square in noise standard deviations.
@@ -70,8 +70,8 @@ pub struct Told {
     pub deviation: f64,
 }
 
-impl Told {
-    /// Whether the recordings say that it runs on.
+impl HoldEvidence {
+    /// Whether the recordings show that it is linear between samples.
     pub fn runs_on(&self) -> bool {
         let claim = &tuning().claim;
         self.share > claim.runs_on * self.deviation && (self.share - 1.0).abs() < 0.5 && self.changes.iter().any(|c| *c > claim.useful)
@@ -84,7 +84,7 @@ impl Told {
 }
 
 /// The evidence of a fitted structure's residual on each input that is assumed to be held.
-pub fn told(evaluator: &Evaluator, fitted: &Candidate) -> Vec<Told> {
+pub fn evidence(evaluator: &Evaluator, fitted: &Candidate) -> Vec<HoldEvidence> {
     let problem = evaluator.problem;
     let fit = &fitted.fit;
     let stride = fit.residuals.len().div_ceil(tuning().screening.residuals).max(1);
@@ -104,7 +104,7 @@ pub fn told(evaluator: &Evaluator, fitted: &Candidate) -> Vec<Told> {
         // Neighbouring residuals are correlated, so each counts for less than one; the residual of the model counts as noise.
         let unit = (dot(&left, &left) / left.len().max(1) as f64).max(1.0) * fitted.correlation_time;
         let deviation = if size > 0.0 { (unit / (size * stride as f64)).sqrt() } else { f64::INFINITY };
-        Some(Told { input, changes, share, deviation })
+        Some(HoldEvidence { input, changes, share, deviation })
     };
     assumed(problem).into_iter().filter_map(one).collect()
 }

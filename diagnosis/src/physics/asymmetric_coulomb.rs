@@ -13,7 +13,7 @@ pub(super) const PHYSICS: Physics = Physics {
     state: State::Reversals,
     mark: Mark::Lopsided,
     facts: Facts {
-        twin: Some("lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"),
+        twin: Some("asymmetric dry friction and dry friction with a bias are the same force: a force sensor at rest separates them"),
         sliding: &["positive", "negative"],
         contains: &["coulomb"],
         spans: |h, _| match h.starts.first() {

@@ -16,7 +16,8 @@ pub(super) const PHYSICS: Physics = Physics {
     facts: Facts {
         proportional: true,
         twin: Some(
-            "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open",
+            "back-EMF and a damper to ground on the driven body are the same force: measure the motor's current, or let the device coast \
+                with the winding open",
         ),
         contains: &["damper"],
         ..Facts::NONE

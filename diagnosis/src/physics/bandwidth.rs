@@ -13,7 +13,7 @@ pub(super) const PHYSICS: Physics = Physics {
     state: State::WithItsVariable,
     mark: Mark::Lag,
     facts: Facts {
-        twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+        twin: Some("a delay at the only input and at the only output shift the same signal: a second sensor separates them"),
         ..Facts::NONE
     },
     propose: |sites| {

@@ -20,7 +20,7 @@ pub(super) const PHYSICS: Physics = Physics {
         proportional: true,
         // A motor answers its command within some milliseconds, a bus or a camera within a fifth of a second. Below 0 only beside a prescribed motion.
         plausible: &[("delay", -3e-3, 0.2)],
-        twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+        twin: Some("a delay at the only input and at the only output shift the same signal: a second sensor separates them"),
         // To first order.
         spans: |_, seen| vec![ForceSpan::proportional(vec![seen.period])],
         ..Facts::NONE

@@ -6,7 +6,7 @@ use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 pub(super) const PHYSICS: Physics = Physics {
     name: "gain",
     family: Family::Scale,
-    words: "a gain that is off",
+    words: "a wrong gain",
     size: "gain",
     against: Against::Signal,
     state: State::WithItsVariable,

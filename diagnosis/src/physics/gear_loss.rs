@@ -6,7 +6,7 @@ use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 pub(super) const PHYSICS: Physics = Physics {
     name: "gear_loss",
     family: Family::Friction,
-    words: "a loss in proportion to the force passed on",
+    words: "a loss proportional to the transmitted force",
     size: "efficiency",
     against: Against::Velocity,
     state: State::Reversals,

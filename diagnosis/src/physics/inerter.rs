@@ -13,7 +13,7 @@ pub(super) const PHYSICS: Physics = Physics {
     state: State::WithItsVariable,
     mark: Mark::Mass,
     facts: Facts {
-        twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+        twin: Some("inertia and an inerter to ground are the same force: weigh the body to separate them"),
         // To ground it is added inertia, which `inertia` proposes.
         contains: &["inertia"],
         ..Facts::NONE

@@ -14,7 +14,7 @@ pub(super) const PHYSICS: Physics = Physics {
     mark: Mark::Mass,
     facts: Facts {
         proportional: true,
-        twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+        twin: Some("inertia and an inerter to ground are the same force: weigh the body to separate them"),
         contains: &["inerter"],
         ..Facts::NONE
     },

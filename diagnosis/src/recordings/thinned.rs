@@ -39,8 +39,10 @@ pub fn thinned(problem: Problem) -> (Problem, Option<Remark>) {
     let (held_out, _) = taken(&problem.held_out, most);
     let mut text = format!("hold {total} samples, of which {} are fitted", samples_of(&fit));
     if every > 1 {
-        let how =
-            format!("one in {every}, with the forces between as straight lines, which changes a prediction by {changes:.2} of its noise");
+        let how = format!(
+            "every {every}th sample is used, with linear forces between, which changes a prediction by {changes:.2} noise \
+                standard deviations"
+        );
         text = format!("{text}: {how}");
     }
     if share < 1.0 {

@@ -76,7 +76,7 @@ impl Unknown {
     }
 }
 
-/// What a fit says of an input that was not measured.
+/// The estimate of an input that was not measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimated {
     /// Name of the input.

@@ -21,7 +21,7 @@ use crate::output_error::candidate::{key_of, sort};
 use crate::output_error::effort::Effort;
 use crate::output_error::error_budget::error_budget;
 use crate::output_error::evaluator::Evaluator;
-use crate::output_error::hold::told;
+use crate::output_error::hold::evidence;
 use crate::output_error::work::{Budget, Limit};
 use crate::physics;
 use crate::recordings::problem::Problem;
@@ -48,7 +48,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let samples = refitted.fit.residuals.len();
     let mut hypotheses = hypotheses_for(&nominal, settings);
-    report("looking for ripples");
+    report("searching for ripples");
     let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.noise_sd, &mut hypotheses);
     report("screening");
     let coupled = &nominal.coupled;
@@ -78,7 +78,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     schedule::run(&mut state, settings, report);
     let (exhausted, journal) = (state.left_out, std::mem::take(&mut state.journal));
     let mut found = state.found;
-    report("fitting the best to the end");
+    report("fitting the best to convergence");
     ending::make_simpler(&course, &mut found, &work);
     ending::bring_to_their_ends(evaluator, &mut found, refitted, &work);
     let (alone, fewer): (Vec<_>, Vec<_>) =
@@ -94,7 +94,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
         t.taken = single.map(|c| 1.0 - c.fit.cost / refitted.fit.cost);
     }
-    let holds = told(evaluator, &refitted);
+    let holds = evidence(evaluator, &refitted);
     Ok(Search {
         errors: error_budget(evaluator, &refitted, &holds),
         holds,

@@ -5,7 +5,7 @@ use crate::equation_error::OnForces;
 use crate::hypothesis::Place;
 use crate::output_error::candidate::Candidate;
 use crate::output_error::error_budget::BudgetedError;
-use crate::output_error::hold::Told;
+use crate::output_error::hold::HoldEvidence;
 use crate::output_error::work::Steps;
 
 /// A hypothesis that was tried alone.
@@ -40,7 +40,7 @@ pub struct Search {
     /// Errors in the predictions of the refitted nominal model although no effect is missing.
     pub errors: Vec<BudgetedError>,
     /// The evidence of the refitted nominal model on inputs that are held by default.
-    pub holds: Vec<Told>,
+    pub holds: Vec<HoldEvidence>,
     /// Standard deviation of each output's measuring error, in its unit.
     pub noise_sd: Vec<f64>,
     /// Level of each output with the parameters as given, noise standard deviations.
@@ -84,7 +84,7 @@ impl Search {
 #[derive(Debug, thiserror::Error)]
 pub enum SearchError {
     /// The nominal model's motion leaves all bounds on the recordings.
-    #[error("the nominal model runs away on the recordings: check units, signs and sample time of the inputs")]
+    #[error("the nominal model diverges on the recordings: check units, signs and sample time of the inputs")]
     RunsAway,
     /// The refitted nominal model cannot be simulated.
     #[error("the refitted nominal model cannot be simulated: {0}")]

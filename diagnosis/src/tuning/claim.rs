@@ -24,7 +24,7 @@ group! {
         /// Share of gains and losses of the blocks that has to speak for an effect where it shows in few of them.
         one_sided: f64 = 0.9, "-", Judgement("noise takes from the other blocks a tenth of what a short event gives");
         /// Least improvement on unseen recordings that is of use: of the root mean square, over the noise standard deviation or over itself, whichever is larger.
-        useful: f64 = 0.01, "-", Judgement("below one percent of the noise no controller and no user can tell the models apart");
+        useful: f64 = 0.01, "-", Judgement("below 1 % of the noise neither a controller nor a user can distinguish the models");
         /// Standard deviations by which the recordings have to say that an input runs on between its samples, where the model file does not say that it is held.
         runs_on: f64 = 5.0, "standard deviations", Statistics("one in two million by chance; physics that is left out may look like a little of it");
         /// Residual of the held-out recordings, over that of the fitted ones and over the noise, above which what was fitted does not explain them.
@@ -56,15 +56,15 @@ group! {
         /// Share of the samples that glitches have, at most.
         glitch_share: f64 = 0.02, "-", Judgement("what is off more often is no glitch");
         /// Log-odds of a finding: a constant, then one for each of its figures, see [`crate::belief::confidence::Figures`].
-        confidence: [f64; 12] = [-1.26, 0.465, 0.0936, 0.0, 0.295, 1.15, 0.0, -0.239, -1.37, -0.996, -0.755, 0.0], "log-odds", Measured("a logistic regression on drawn cases: `diagnosis/tests/concealed/calibrate.py fit`; docs/diagnosis.md says on which");
+        confidence: [f64; 12] = [-1.26, 0.465, 0.0936, 0.0, 0.295, 1.15, 0.0, -0.239, -1.37, -0.996, -0.755, 0.0], "log-odds", Measured("a logistic regression on drawn cases: `diagnosis/tests/concealed/calibrate.py fit`; docs/diagnosis.md lists them");
         /// Log-odds that some physics of a finding's family is at its place, as `confidence`.
         family_confidence: [f64; 12] = [-3.18, 1.6, 0.357, 0.0, 0.0, 1.02, -0.0964, 0.0, 0.0, -0.368, 0.0, 0.162], "log-odds", Measured("`diagnosis/tests/concealed/calibrate.py fit-family`, as `confidence`");
         /// Advantage over a rival, in units of the criterion, that makes it e times less likely than another one.
-        softened: f64 = 20.0, "criterion", Judgement("an information criterion says 2; a simulator is never the device");
+        softened: f64 = 20.0, "criterion", Judgement("an information criterion requires 2; a simulator never equals the device");
         /// Confidence that a finding has at most where held-out recordings are predicted worse with it than by the model as given.
         as_likely: f64 = 0.5, "probability", Judgement("as likely as not");
         /// Alternatives that are listed.
-        alternatives: usize = 6, "structures", Cost("nobody reads more");
+        alternatives: usize = 6, "structures", Cost("more are not readable");
         /// Share of a finding's confidence from which a rival is named in the sentence.
         near_rival: f64 = 0.5, "-", Judgement("at least half as sure");
         /// Rivals that are named, and whose models are written.

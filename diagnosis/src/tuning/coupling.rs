@@ -12,7 +12,7 @@ group! {
         /// Factor on the strength with which coupled fits go on.
         looser: f64 = 0.1, "-", Judgement("residuals are then more and more simulation errors");
         /// Factor on the strength with which a part's initial motion is found.
-        firm: f64 = 30.0, "-", Judgement("a part has to begin as it was measured");
+        firm: f64 = 30.0, "-", Judgement("a segment has to begin at the measured state");
         /// Samples of a part, at least.
         shortest: usize = 256, "samples", Cost("shorter parts spend their time on transients");
         /// Share of a part that does not count, where it does not begin with its recording.

@@ -18,7 +18,7 @@ pub fn tuning_page() -> String {
             group = own;
             let _ = write!(page, "\n## {group}\n\n| entry | value | unit | decides | evidence |\n|---|---|---|---|---|\n");
         }
-        let (kind, why) = row.evidence.told();
+        let (kind, why) = row.evidence.kind_and_reason();
         let _ = writeln!(page, "| `{field}` | {} | {} | {} | {kind}: {why} |", row.value, row.unit, row.decides);
     }
     page += "\n## steps\n\nEach step proposes structures, which race (search.further, search.ended). Where the best is far from the noise, a step may take its share of the work.\n\n\

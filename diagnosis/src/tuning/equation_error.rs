@@ -32,17 +32,17 @@ group! {
         /// Share of the error of left-out stretches by which a richer structure has to be better, per number.
         worth: f64 = 0.015, "-", Judgement("real devices always give one percent of the error of forces to one more number");
         /// The least share by which a richer structure has to be better.
-        least_gain: f64 = 0.03, "-", Judgement("as worth, of all its numbers");
+        least_gain: f64 = 0.03, "-", Judgement("as worth, for all its parameters");
         /// Standard errors of the mean, stretch by stretch, by which a richer structure has to be better.
-        sure: f64 = 1.0, "standard errors", Statistics("the richer one was chosen as the best of many already, and pays for its numbers");
+        sure: f64 = 1.0, "standard errors", Statistics("the richer one was already chosen as the best of many, and is penalised for its parameters");
         /// Standard errors by which the force that a richer structure has more shows in what the simpler one leaves, where the errors do not decide.
         shown: f64 = 1.645, "standard errors", Statistics("one in twenty by chance, as Clark and West have it for models that contain each other");
         /// What it costs that a law is one of many, in numbers.
-        picked: f64 = 1.0, "numbers", Statistics("which of a dozen laws it is says as much as a number known to a tenth; two laws are a rarer cause than one with their numbers");
+        picked: f64 = 1.0, "numbers", Statistics("the choice among a dozen laws contains as much information as a parameter known to 10 %; two laws are less likely than one with as many parameters");
         /// Numbers that a rival may have more than the chosen structure.
         rival_numbers: usize = 2, "numbers", Judgement("what needs more than one law more explains anything");
         /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::belief::on_forces::Figures`].
-        confidence: [f64; 7] = [1.927, -0.353, 1.375, 1.749, 0.507, 0.0, 0.129], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
+        confidence: [f64; 7] = [1.927, -0.353, 1.375, 1.749, 0.507, 0.0, 0.129], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md lists the cases");
         /// The same of its kind.
         kind_confidence: [f64; 7] = [1.571, 1.0, 0.947, 2.285, 0.149, 0.0, -0.135], "log-odds", Measured("as `confidence`");
         /// Confidence of all laws of a structure from which others that predict as well are not reported beside it.
@@ -54,6 +54,6 @@ group! {
         /// Share of what a search on forces leaves of them below which what a search by simulation leaves decides.
         sharper: f64 = 0.7, "-", Judgement("half the power: what stands in the columns is then not what is missing");
         /// Structures that are simulated and whose numbers are refined.
-        simulated: usize = 8, "structures", Cost("those that left-out stretches hardly tell apart are fewer");
+        simulated: usize = 8, "structures", Cost("fewer are hardly separated by held-out segments");
     }
 }

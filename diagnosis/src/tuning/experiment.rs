@@ -8,7 +8,7 @@ group! {
         /// Separation at which an experiment decides between explanations.
         wanted: f64 = 5.0, "standard deviations", Statistics("its square is the difference of costs; half of it beyond claim.alike's doubt");
         /// Repeats of an experiment, at most.
-        most_repeats: u64 = 10, "repeats", Judgement("nobody plays more");
+        most_repeats: u64 = 10, "repeats", Judgement("more repeats are not practical");
         /// Rivals that are separated, at most.
         rivals: usize = 4, "structures", Cost("each pair is simulated for each excitation");
         /// Experiments that are compared by a true refit.
@@ -32,7 +32,7 @@ group! {
         /// Substeps per sample for choosing, and for the figures of the best, at most.
         substeps: [usize; 2] = [4, 16], "substeps", Cost("as fit.middle_substeps");
         /// Standard deviation of a parameter, as a share of it, from which it is taken as open.
-        open: f64 = 0.05, "-", Judgement("5 % is what a data sheet says");
+        open: f64 = 0.05, "-", Judgement("5 % is the accuracy of a data sheet");
         /// Explanations that no fit was made of and that are fitted before anything is claimed, at most.
         contenders: usize = 8, "structures", Cost("simple laws at a place and its neighbours");
         /// How far such an explanation may be behind to be fitted to its end.

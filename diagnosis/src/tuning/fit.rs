@@ -75,7 +75,7 @@ group! {
         /// Largest start position of a body, in sizes of what was measured; its largest start velocity crosses that size in a sample period over so many.
         start_range: f64 = 20.0, "-", Judgement("devices start inside the range that they move in");
         /// Samples from whose first ones a start is read off, by a parabola.
-        start_samples: usize = 16, "samples", Judgement("twenty periods of the sample clock are short beside what a device does, and tell a speed");
+        start_samples: usize = 16, "samples", Judgement("twenty sample periods are short relative to the device dynamics, and determine a velocity");
         /// Standard deviation of those before data, as a share of their largest value.
         start_prior: f64 = 0.3, "-", Judgement("wider than any start that was measured");
         /// Spacing of the weights of an unknown input that are moved together for derivatives.

@@ -36,7 +36,7 @@ group! {
         /// Distance over which dry friction builds up, in rms displacements.
         slip: f64 = 1e-3, "-", Numerics("smooth enough for a linearisation along the motion");
         /// Passes over the travel that a ripple makes, at least.
-        ripple_turns: f64 = 2.0, "passes", Statistics("one pass cannot be told from a trend");
+        ripple_turns: f64 = 2.0, "passes", Statistics("one pass cannot be distinguished from a trend");
         /// Ripples distinguished, at most.
         ripples: usize = 3, "ripples", Cost("motors have cogging, commutation, and a gear");
     }

@@ -14,7 +14,7 @@ group! {
         /// Samples of a record, at least.
         fewest_samples: usize = 50, "samples", Statistics("fewer say nothing of a device with three parameters and noise");
         /// Samples of all fitted recordings, at most; of more, every n-th is taken.
-        most_samples: usize = 60_000, "samples", Cost("a search simulates some thousand times; numbers known from so many are known to a third of a percent of what one sample says");
+        most_samples: usize = 60_000, "samples", Cost("a search simulates some thousand times; parameters from all these samples have 0.4 % of the standard error of one sample");
         /// What that may change in a prediction, in noise standard deviations.
         thinned_error: f64 = 0.1, "noise standard deviations", Statistics("it adds a hundredth to the mean square of the noise");
         /// Samples on which it is tried.
@@ -52,7 +52,7 @@ group! {
         /// Difference of a period from the one before, over that of those before, above which the device has come to its rhythm.
         settles: f64 = 0.7, "-", Judgement("what the device does not repeat stays as large, what decays falls");
         /// Difference of two repeats, in noise standard deviations, above which the device does not repeat itself.
-        repeats: f64 = 3.0, "noise standard deviations", Judgement("two recordings with noise of their own differ by 1, as it is computed");
+        repeats: f64 = 3.0, "noise standard deviations", Judgement("two recordings with independent noise differ by 1 in this measure");
         /// Correlation of a command's noise with a sensor's above which a controller closes the loop.
         closed_loop: f64 = 0.5, "-", Statistics("0.1 is two standard errors at 400 samples");
         /// Ratio of sample times in a set above which it is remarked.

@@ -40,7 +40,7 @@ group! {
         /// Factor from one of them to the next.
         scan_ratio: f64 = 0.85, "-", Judgement("the valley of a play is about as wide as a third of it");
         /// Factor on the strength of the coupling there.
-        scan_coupling: f64 = 10.0, "-", Judgement("sides that meet a little later must not lead elsewhere");
+        scan_coupling: f64 = 10.0, "-", Judgement("a slightly later contact must not lead to another minimum");
         /// Substeps per sample of fits there, at most.
         scan_substeps: usize = 16, "substeps", Cost("sides met to a tenth of a sample time");
         /// Sizes that are fitted.
@@ -110,7 +110,7 @@ group! {
         /// The same before the best is at the noise.
         behind_far: f64 = 4.0, "-", Cost("twice the residual");
         /// Excerpts of a stated parameter that a law beside it may take over.
-        taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
+        taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in series are separated along a narrow valley: starts along it");
         /// Share of the compliance of a joint that a spring has which is put into it, at its starts.
         condensed_softness: [f64; 3] = [0.2, 0.5, 0.8], "-", Judgement("less is no compliance of use, more leaves nothing of the model's own spring");
         /// Inertia of the body there, in that of the lighter end.
@@ -136,7 +136,7 @@ group! {
         /// Share of the nominal model's residual (mean square) that it has to leave when coupled to the measured motion.
         coupled_leaves: f64 = 0.3, "-", Judgement("where coupling explains more than that, it explains what is missing, too");
         /// The same in mean squares of the noise.
-        coupled_leaves_noise: f64 = 3.0, "mean square", Judgement("three times the noise is enough to tell physics apart");
+        coupled_leaves_noise: f64 = 3.0, "mean square", Judgement("three times the noise is enough to separate effects");
         /// Factors on the coupling, tried in this order until the nominal model leaves enough.
         couplings: [f64; 5] = [0.2, 1.0, 0.2, 0.04, 0.008], "-", Judgement("the first on parts of the recordings, the others on the whole");
     }

@@ -19,7 +19,7 @@ pub enum Evidence {
 
 impl Evidence {
     /// Kind and text.
-    pub fn told(&self) -> (&'static str, &'static str) {
+    pub fn kind_and_reason(&self) -> (&'static str, &'static str) {
         match self {
             Evidence::Statistics(text) => ("statistics", text),
             Evidence::Numerics(text) => ("numerics", text),

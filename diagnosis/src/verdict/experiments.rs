@@ -74,7 +74,7 @@ fn planned<'a, 's>(
         Word::Missing | Word::Unexplained | Word::Parameters | Word::NothingMissing => match next_effect(search, best) {
             Some(more) if !decision.at_floor => apart(&[more]),
             _ => determine(problem, search, decision, budget).map_err(|reason| match decision.at_floor {
-                true => Reason(format!("{reason}: nothing more has to be recorded for this model")),
+                true => Reason(format!("{reason}: no further recording is needed for this model")),
                 false => reason,
             }),
         },
@@ -91,8 +91,8 @@ fn is_kin(best: &Candidate, other: &Candidate) -> bool {
 fn determine<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let best = decision.best;
     let all: Vec<usize> = (0..best.structure.free.len()).collect();
-    let told: Vec<f64> = all.iter().map(|number| decision.spread.half(*number) / NORMAL_975).collect();
-    excite(problem, &best.structure, &best.fit.values, &all, &told, &search.noise_sd, budget)
+    let deviations: Vec<f64> = all.iter().map(|number| decision.spread.half(*number) / NORMAL_975).collect();
+    excite(problem, &best.structure, &best.fit.values, &all, &deviations, &search.noise_sd, budget)
 }
 
 /// An experiment as the verdict has it; its file is written under [`EXPERIMENT_FILE`].

@@ -16,7 +16,7 @@ pub enum VerdictError {
     #[error(transparent)]
     Patch(#[from] backdrive_plant::write::PatchError),
     /// Refitted parameters cannot be put into the model.
-    #[error("the refitted numbers do not fit into the model: {0}")]
+    #[error("the refitted parameters cannot be written into the model: {0}")]
     Refitted(String),
     /// An effect that was found cannot be put into the model.
     #[error(transparent)]

@@ -14,16 +14,15 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
     let doubt = match decision.doubt {
         None => return said,
         Some(Doubt::WorseThanGiven) => {
-            "the held-out recordings are predicted worse with it than by the model as given, so the model is written as given"
+            "but with it the held-out recordings are predicted worse than by the nominal model, so the nominal model is written"
         }
         Some(Doubt::WorseSimulated) => {
-            "simulated from the force, the motion of the held-out recordings comes out worse with it than by the model as given, so the model is written as given"
+            "but simulated from the force, the held-out motion is predicted worse with it than by the nominal model, so the nominal model \
+                is written"
         }
-        Some(Doubt::WorseThanRefit) => {
-            "recordings that no fit has seen are predicted better by the model with its numbers refitted and nothing added, so this is as likely as not"
-        }
+        Some(Doubt::WorseThanRefit) => "but the refitted nominal model predicts held-out recordings better, so the finding is uncertain",
         Some(Doubt::AtAnEnd) => {
-            "a number is at the end of what the fit may try, so this is as likely as not: check the numbers of the model file"
+            "but a parameter is at the bound of its search range, so the finding is uncertain: check the parameters of the model file"
         }
     };
     format!("{}; {doubt}", said.replacen("the model leaves out", "the model may leave out", 1))
@@ -40,41 +39,47 @@ fn without_reserve(decision: &Decision, planned: bool) -> String {
         .filter(|_| decision.forces.is_some_and(|forces| !forces.is_at_noise()))
         .map(|share| format!("{}", round_significant(100.0 * share, 2)));
     let end = if let Some(percent) = &of_force {
-        format!("down to {percent} % of the force, which goes with none of the laws that were looked at")
+        format!("down to {percent} % of the force, which none of the tested laws explains")
     } else if level < tuning().noise.unexplained {
         format!("down to {noise}")
     } else {
         format!("to {times} times {noise}")
     };
     let still = if level < tuning().noise.unexplained { String::new() } else { format!("; the residual is still {times} times {noise}") };
-    let unseen = decision.unseen.map_or_else(String::new, |level| {
-        format!("; recordings that no fit has seen are predicted only to {} times {noise}", round_significant(level, 2))
-    });
+    let unseen = decision
+        .unseen
+        .map_or_else(String::new, |level| format!("; the error on held-out recordings is {} times {noise}", round_significant(level, 2)));
     let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match decision.word {
         Word::Ambiguous => {
             let others = match findings.get(1..) {
                 Some(others) if !others.is_empty() => {
-                    format!(", beside {}", others.iter().map(asserted).collect::<Vec<_>>().join(", and "))
+                    format!(", besides {}", others.iter().map(asserted).collect::<Vec<_>>().join(", and "))
                 }
                 _ => String::new(),
             };
             let next = if planned { ", the next experiment would" } else { "" };
             let what = findings.first().map_or_else(|| "something".to_string(), known);
-            format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}{unseen}")
+            format!("the model leaves out {what}{others}: the recordings do not separate them{next}{still}{unseen}")
         }
         Word::CannotTell if !findings.is_empty() => {
             let what = findings.first().map_or_else(|| "something".to_string(), known);
-            format!("the model leaves out {what}: neither the recordings nor a further one like them can tell which{still}{unseen}")
+            format!("the model leaves out {what}: neither these recordings nor a planned experiment can separate them{still}{unseen}")
         }
-        Word::CannotTell => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
+        Word::CannotTell => "the device hardly moves in the recordings: they do not show what is missing".to_string(),
         Word::Missing if decision.at_floor && !still.is_empty() => {
-            format!("the model leaves out {all}; with it the recordings are explained down to what the device repeats")
+            format!("the model leaves out {all}; with it the recordings are explained down to the repeatability of the device")
         }
         Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}{unseen}"),
-        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times {noise} remains{unseen}"),
-        Word::Unexplained => format!("something is missing that none of the laws tried explains; refitted, the model comes {end}{unseen}"),
-        Word::Parameters => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
+        Word::Missing => format!("the model leaves out {all}; a residual of {times} times {noise} remains unexplained{unseen}"),
+        Word::Unexplained => format!(
+            "an effect is missing that none of the tested laws explains; the refitted model explains the \
+            recordings {end}{unseen}"
+        ),
+        Word::Parameters => format!(
+            "no effect is missing, but the model's parameters are wrong; refitted, they explain the recordings \
+            {end}"
+        ),
         Word::NothingMissing => format!("the model explains the recordings {end}"),
     }
 }

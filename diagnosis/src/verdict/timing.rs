@@ -16,8 +16,8 @@ pub fn timing(problem: &Problem, search: &Search) -> Vec<Remark> {
     let one = |(which, hypothesis): (usize, &crate::hypothesis::Hypothesis)| {
         let late = lag(hypothesis, values.get(which)?).filter(|_| is_timing_of(problem, best, which))?;
         let text = format!(
-            "seems to be {:.3} ms late, {:.1} % of a sample period: when it was sampled or how the input runs between samples, not physics (less than {:.0} % is not \
-             claimed)",
+            "seems to lag by {:.3} ms, {:.1} % of a sample period: an effect of sampling time or of the input between samples, not of the \
+             device (less than {:.0} % is not claimed)",
             1e3 * late,
             100.0 * late / period,
             100.0 * tuning().claim.timing

@@ -81,7 +81,7 @@ fn what_a_set_says_of_joints_is_checked() {
     let unknown = refused("[joints.wrist]\nposition = \"q1\"\ntorque = \"tau1\"\n", |_| {});
     assert!(unknown.contains("[joints.wrist]") && unknown.contains("it has shoulder, elbow"), "{unknown}");
     let missing = refused("[joints.shoulder]\nposition = \"q1\"\ntorque = \"tau1\"\n", |_| {});
-    assert!(missing.contains("says nothing of joint \"elbow\""), "{missing}");
+    assert!(missing.contains("does not describe joint \"elbow\""), "{missing}");
     let misspelt = refused("[joints.shoulder]\npositoin = \"q1\"\ntorque = \"tau1\"\n", |_| {});
     assert!(misspelt.contains("did you mean \"position\""), "{misspelt}");
     let constant = refused("[joints.shoulder]\nposition = \"q1\"\ncurrent = \"tau1\"\n", |_| {});

@@ -114,7 +114,7 @@ fn a_law_without_a_term_is_not_found_a_second_time_nor_written_twice() {
     with(place, &at_elbow("lugre", laws()[0].1));
     let found = found(place);
     assert_eq!(found.verdict.word, Word::NothingMissing, "{}", found.verdict.sentence);
-    assert!(found.notes.iter().any(|note| note.contains("\"seal\" (lugre) counts along the measured motion")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("\"seal\" (lugre) is computed along the measured motion")), "{:?}", found.notes);
     let elbow: Vec<&str> = found.model.split("[[elements]]").skip(1).filter(|e| e.contains("\"elbow\"") && !e.contains("damper")).collect();
     assert!(elbow.len() == 1 && elbow[0].contains("lugre"), "{}", found.model);
 }
@@ -299,7 +299,7 @@ fn a_joint_without_a_motor_is_diagnosed_by_its_equation() {
         write(&place.join(name), &swing(seed as u64 + 5, 0.01));
     }
     let refused = diagnose(&problem(place), &Settings::default()).unwrap_err().to_string();
-    assert!(refused.contains("elbow.torque: is 0 throughout") && refused.contains("say torque = 0 in [joints.elbow]"), "{refused}");
+    assert!(refused.contains("elbow.torque: is 0 in all samples") && refused.contains("set torque = 0 in [joints.elbow]"), "{refused}");
 
     let joints = "[joints.shoulder]\nposition = \"q1\"\ntorque = \"tau1\"\n[joints.elbow]\nposition = \"q2\"\ntorque = 0\n";
     let text = std::fs::read_to_string(place.join("set.toml")).unwrap();

@@ -61,15 +61,15 @@ impl Dialect {
 }
 
 /// What a reader of the file should know.
-fn told(model: &Model) -> Vec<String> {
+fn heading(model: &Model) -> Vec<String> {
     let what = if model.title.is_empty() { &model.name } else { &model.title };
     let mut all = vec![format!("Feed-forward of friction and the like: {what}.")];
     if !model.source.is_empty() {
-        all.push(format!("Source of the numbers: {}.", model.source.trim_end_matches('.')));
+        all.push(format!("Source of the parameters: {}.", model.source.trim_end_matches('.')));
     }
     all.extend(
         [
-            "Each function gives the effort that a motor adds along +q, so that what is listed in it is not felt.",
+            "Each function returns the effort along +q with which a motor compensates the listed terms.",
             "q: position, dq: velocity, load: force of what the joint drives, positive where it resists motion along +q.",
             "The sign of dq is tanh(dq/width): exact to rounding from 20 widths on. What moves together adds up.",
         ]
@@ -88,7 +88,7 @@ pub(super) fn names(model: &Model, joints: &[Joint]) -> Vec<String> {
 /// As C99.
 pub(super) fn c(model: &Model, joints: &[Joint]) -> String {
     // What a user wrote does not end the comment.
-    let mut out: String = told(model).iter().map(|line| format!("/* {} */\n", line.replace("*/", "* /"))).collect();
+    let mut out: String = heading(model).iter().map(|line| format!("/* {} */\n", line.replace("*/", "* /"))).collect();
     out += "#include <math.h>\n";
     for (joint, name) in joints.iter().zip(names(model, joints)) {
         out += &format!(
@@ -110,7 +110,7 @@ pub(super) fn c(model: &Model, joints: &[Joint]) -> String {
 /// As Python 3.
 pub(super) fn python(model: &Model, joints: &[Joint]) -> String {
     let one_line = |text: &str| text.replace(['\n', '\r'], " ");
-    let mut out: String = told(model).iter().map(|line| format!("# {}\n", one_line(line))).collect();
+    let mut out: String = heading(model).iter().map(|line| format!("# {}\n", one_line(line))).collect();
     out += "import math\n";
     for (joint, name) in joints.iter().zip(names(model, joints)) {
         out += &format!(

@@ -192,7 +192,7 @@ fn nearest(law: &Law) -> (String, Option<(Law, String)>) {
         Law::Lugre(l) => (memory, stribeck(l.coulomb, l.at_rest, l.velocity)),
         Law::PreisachLugre(l) => (memory, stribeck(l.coulomb, l.at_rest.max(l.coulomb), l.velocity)),
         Law::MaxwellSlip(l) => (memory, coulomb(l.force.iter().sum(), "the sum of its sliders")),
-        Law::WarmFriction(l) => ("it falls as it warms, which nobody measures".to_owned(), coulomb(l.force, "its level when cold")),
+        Law::WarmFriction(l) => ("it falls with temperature, which is not measured".to_owned(), coulomb(l.force, "its level when cold")),
         Law::HystereticSpring(_) | Law::BoucWen(_) | Law::Creep(_) => (memory, None),
         Law::Backlash(_) | Law::Contact(_) | Law::HuntCrossley(_) => ("a stop is to be felt, and not to be made good".to_owned(), None),
         Law::Inerter(_) => ("it acts by acceleration, which is no argument of the function".to_owned(), None),

@@ -100,7 +100,7 @@ pub(super) fn of_robot(robot: &Robot, layout: &Layout, network: &Network, integr
     let mut out = String::new();
     match robot.links.first() {
         Some(base) if base.name == WORLD => {
-            notes.push("the base is called \"world\", which is MuJoCo's own name: what it carries stands in <worldbody>".to_owned());
+            notes.push("the base is called \"world\", a name reserved by MuJoCo: its children are written into <worldbody>".to_owned());
             writer.children(0, 2, &mut out);
         }
         Some(base) => {

@@ -133,5 +133,5 @@ fn bouc_wen(l: &BoucWen) -> Option<(Law, String)> {
     let springs = [(slips, (1.0 - l.ratio) * l.stiffness * bound), (stays, stays * NEVER_YIELDS)];
     let (stiffness, force) = springs.into_iter().filter(|(k, _)| *k > 0.0).unzip();
     let law = MaxwellSlip::new(stiffness, force).ok()?;
-    Some((Law::MaxwellSlip(law), "its elastic share, and beside it a spring that gives way at its bound".to_owned()))
+    Some((Law::MaxwellSlip(law), "its elastic part, in parallel with a spring that yields at its bound".to_owned()))
 }

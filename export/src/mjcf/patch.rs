@@ -131,12 +131,12 @@ fn take_out(section: Node, model: &Model, layout: &Layout, edits: &mut Edits, no
             let of_ours = |sensor: &Node| sensor.attribute("name").is_some_and(|n| model.outputs.iter().any(|o| o.name == n));
             for sensor in section.children().filter(|n| n.attribute("actuator").is_some() || of_ours(n)) {
                 edits.remove(sensor);
-                say("sensors of the MJCF that read its actuators, or have the name of an output of the model, are taken out");
+                say("sensors of the MJCF that read its actuators, or have the name of an output of the model, are removed");
             }
         }
         "keyframe" if more_bodies || !model.inputs.is_empty() => {
             edits.remove(section);
-            say("the key frames of the MJCF are taken out: the model has other inputs or more bodies");
+            say("the key frames of the MJCF are removed: the model has other inputs or more bodies");
         }
         _ => {}
     }

@@ -43,7 +43,7 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
     };
     if arm.robot.gravity != Robot::default().gravity {
         let [x, y, z] = arm.robot.gravity.into();
-        let why = format!("({x}, {y}, {z}) m/s² is no part of a URDF: state it in the program that reads the file");
+        let why = format!("({x}, {y}, {z}) m/s² is not part of a URDF: set it in the program that reads the file");
         let usual = Change::Gravity(Robot::default().gravity);
         left_out.push(LeftOut::key(Part::Robot, "gravity", "gravity", why, Some(usual)).replaced_by("(0, 0, -9.81) m/s²"));
     }

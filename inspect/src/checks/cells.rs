@@ -15,7 +15,7 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             let weight = if is_words { Weight::Note } else { Weight::Wrong };
             let finding =
                 Finding::new(FindingKind::Missing, &recording.file, &[&signal.name], format!("column {:?} holds {other}", signal.name));
-            out.push(finding.weighing(weight).todo("leave such rows out, or leave the column out if it is not needed"));
+            out.push(finding.weighing(weight).todo("remove these rows, or omit the column if it is not needed"));
             continue;
         }
         let Some(first) = signal.values.iter().position(|x| !x.is_finite()) else { continue };

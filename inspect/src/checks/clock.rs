@@ -40,7 +40,7 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             finding.rows = Some([stream.row(row), stream.row(row + 1)]);
             finding.time_s = Some([stream.time(row), stream.time(row + 1)]);
             finding.todo = match fault.kind {
-                ClockFaultKind::Uneven => "nothing: the recorded times are used as they are".to_string(),
+                ClockFaultKind::Uneven => "nothing: the recorded times are used unchanged".to_string(),
                 ClockFaultKind::StandsStill => format!("leave out {} {}", stream.row_word(), stream.row(row + 1)),
                 _ => advice::without(&recording.file, row + 1, row + 1, stream.times.len()),
             };

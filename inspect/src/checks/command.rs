@@ -59,7 +59,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             let message = format!("{:?} and {:?} are the same in every row: the state was logged as the command", names[0], names[1]);
             out.push(
                 new(FindingKind::CommandIsPosition, message)
-                    .todo("name the column of the target that was sent; nothing of the response is known"),
+                    .todo("name the column of the command that was sent; the response is not known"),
             );
             continue;
         }
@@ -74,7 +74,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let Some(found) = found.filter(|found| found.explained > EXPLAINED) else { continue };
         let weight = if joint.is_led { Weight::Note } else { Weight::Wrong };
         if found.gain < 0.0 {
-            let message = format!("{:?} moves against {:?}: one of them has the wrong sign", names[0], names[1]);
+            let message = format!("{:?} moves opposite to {:?}: one of them has the wrong sign", names[0], names[1]);
             out.push(new(FindingKind::WrongSign, message).todo(advice::entry(recording, joint, place, "scale = -1")));
         }
         let (size, degree) = (found.gain.abs(), 180.0 / std::f64::consts::PI);
@@ -85,7 +85,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             let message = format!("{:?} is {size:.3} times {:?}: {which:?} is in degrees, the other one in radians", names[0], names[1]);
             out.push(new(FindingKind::WrongUnit, message).todo(advice::entry(recording, joint, at, "unit = \"deg\"")));
         } else if (slow - 1.0).abs() > SCALE && found.gain > 0.0 {
-            let message = format!("slow motion of {:?} is {slow:.3} times that of {:?}: they differ by a scale", names[0], names[1]);
+            let message = format!("slow motion of {:?} is {slow:.3} times that of {:?}: their scales differ", names[0], names[1]);
             let todo = advice::entry(recording, joint, place, &format!("scale = {:.4}", 1.0 / slow));
             out.push(new(FindingKind::WrongScale, message).weighing(weight).todo(todo));
         }
@@ -94,7 +94,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let is_early = found.explained > ALL_BUT && 1.0 - late > WORSE * (1.0 - found.explained).max(1e-9);
         if lag < -EARLY.max(0.6 * recording.period) && lag + wide < 0.0 && is_early && !joint.is_led && !is_against {
             let ahead = format!(
-                "{:?} is {:.0} ms ahead of {:?} (95 % interval ±{:.0} ms), and no joint is ahead of its command",
+                "{:?} is {:.0} ms ahead of {:?} (95 % interval ±{:.0} ms), but a joint cannot lead its command",
                 names[0],
                 -1e3 * lag,
                 names[1],
@@ -107,7 +107,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 let todo = format!("[columns]\ncommand = {a}\nposition = {b}");
                 out.push(new(FindingKind::SwappedColumns, format!("{ahead}, and less noisy: the two columns are exchanged")).todo(todo));
             } else {
-                let todo = "ask the logger which of the two is older; a lag that is computed from them is wrong";
+                let todo = "check in the logger which of the two is older; a lag computed from them is wrong";
                 let finding = new(FindingKind::CommandLate, format!("{ahead}: the command was logged late, or the two are exchanged"));
                 out.push(finding.weighing(Weight::Note).sure(0.7).todo(todo));
             }

@@ -52,7 +52,8 @@ fn one(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding
     let signed = extremes(&drive.values).is_some_and(|(low, high)| low < 0.0 && high > 0.0);
     if best.explained > SIGN && signed && work.is_against(best.lag) {
         let message = format!(
-            "{:?} is directed against both the acceleration and the velocity of {position:?}: it has the wrong sign, or is the torque of the load",
+            "{:?} is opposite to both the acceleration and the velocity of {position:?}: it has the wrong sign, or is the torque of the \
+                load",
             names[0]
         );
         out.push(new(FindingKind::WrongSign, message).todo(advice::entry(recording, joint, place, "scale = -1")).sure(0.9));

@@ -46,9 +46,9 @@ fn stuck(recording: &Recording, joint: &Joint, out: &mut Vec<Finding>) {
             continue;
         }
         let value = signal.values.first().copied().unwrap_or(0.0);
-        let message = format!("{:?} is {value} throughout while its joint moves: the sensor or its column is dead", signal.name);
+        let message = format!("{:?} is constant at {value} while its joint moves: the sensor is dead or the column is wrong", signal.name);
         let todo = match signal.quantity {
-            Quantity::Velocity => "leave the velocity out: it is computed from the position".to_string(),
+            Quantity::Velocity => "omit the velocity: it is computed from the position".to_string(),
             _ => "name the column that holds the position, or record again".to_string(),
         };
         out.push(Finding::new(FindingKind::Stuck, &recording.file, &[&signal.name], message).at(&joint.name).todo(todo));
@@ -98,7 +98,8 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
     let length = stream.time(to) - stream.time(from);
     let (word, a, b) = (stream.row_word(), stream.row(from), stream.row(to));
     let more = if found.len() > 1 { format!(" ({} such stretches)", found.len()) } else { String::new() };
-    let message = format!("{:?} repeats {} for {length:.2} s, {word} {a} to {b}, while it goes on around{more}", signal.name, values[from]);
+    let message =
+        format!("{:?} repeats {} for {length:.2} s, {word} {a} to {b}, while it changes before and after{more}", signal.name, values[from]);
     let mut finding = Finding::new(FindingKind::Frozen, &recording.file, &[&signal.name], message).at(&signal.joint);
     finding.rows = Some([a, b]);
     finding.time_s = Some([stream.time(from), stream.time(to)]);

@@ -82,7 +82,7 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
     let stream = recording.stream(signal);
     let levels: Vec<String> = found.iter().map(|(level, ..)| format!("{level}")).collect();
     let message = format!(
-        "{:?} stands at its limit of {} in {:.1} % of the samples, first in {} {}: it is clipped there",
+        "{:?} is at its limit of {} in {:.1} % of the samples, first in {} {}: it is clipped there",
         signal.name,
         levels.join(" and "),
         100.0 * found.iter().map(|(_, count, _)| count).sum::<usize>() as f64 / values.len() as f64,
@@ -92,7 +92,7 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
     let mut finding = Finding::new(FindingKind::Clipped, &recording.file, &[&signal.name], message).at(&signal.joint);
     finding.rows = Some([stream.row(first), stream.row(first)]);
     finding.time_s = Some([stream.time(first), stream.time(first)]);
-    out.push(finding.todo("widen the sensor's or the drive's range and record again; until then leave these samples out"));
+    out.push(finding.todo("widen the sensor's or the drive's range and record again; until then omit these samples"));
 }
 
 /// Whether the command of a joint goes on beyond a level at which its position stands; true where there is no command.
@@ -151,11 +151,11 @@ fn rectified(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<F
         return;
     }
     let message = format!(
-        "{:?} never changes its sign while the joint moves both ways, and comes down to {least}: it was logged without its sign (rectified)",
+        "{:?} never changes its sign while the joint moves both ways, and its minimum is {least}: it was logged without its sign \
+            (rectified)",
         signal.name
     );
-    let todo = "log the signed value; until then do not use it as a torque: leave it out of the set, the positions say what can be known"
-        .to_string();
+    let todo = "log the signed value; until then omit it from the set and use the positions alone".to_string();
     out.push(Finding::new(FindingKind::Rectified, &recording.file, &[&signal.name], message).at(&joint.name).todo(todo).sure(0.97));
 }
 
@@ -169,7 +169,7 @@ fn quantised(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<F
     if levels < 3.0 || levels >= limit || asked < 3.0 * step * signal.factor().abs() {
         return;
     }
-    let message = format!("{:?} has steps of {step:.6}, {levels:.0} across its motion: what is computed from it is as coarse", signal.name);
+    let message = format!("{:?} has steps of {step:.6}, {levels:.0} across its range: derivatives of it are equally coarse", signal.name);
     // A joint that hardly moves has few steps with any encoder: that is its motion, not its sensor.
     let is_length = signal.stated.or(signal.hint).is_some_and(|unit| unit.kind == Kind::Length);
     let usual = if is_length { USUAL_STEP[1] } else { USUAL_STEP[0] };

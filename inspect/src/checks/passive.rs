@@ -43,13 +43,11 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             joint.command.map(|place| &recording.signals[place]).filter(|command| span(&command.even) < NO_COMMAND * moved)
         {
             let message = format!(
-                "{} moves by {moved:.3} while {:?} does not: the joint is driven by something else, or another column is its command",
+                "{} moves by {moved:.3} while {:?} does not: another input drives the joint, or another column is its command",
                 title(joint),
                 command.name
             );
-            out.push(
-                new(&command.name, message).todo("name the column of the command that was sent, or leave the command of this joint out"),
-            );
+            out.push(new(&command.name, message).todo("name the column of the command that was sent, or omit the command of this joint"));
         }
         for place in joint.drives() {
             let drive = &recording.signals[place];
@@ -58,7 +56,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             if is_still {
                 let value = drive.values.first().copied().unwrap_or(0.0);
                 let message = format!(
-                    "{:?} is {value} throughout while {} moves: the joint has no motor, or its column is dead",
+                    "{:?} is constant at {value} while {} moves: the joint has no motor, or the column is wrong",
                     drive.name,
                     title(joint)
                 );
@@ -68,7 +66,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 && explained(recording, joint, place).is_some_and(|share| share < UNEXPLAINED)
             {
                 let message = format!(
-                    "{:?} is noise alone while {} moves: the joint has no motor, or the sensor is not connected",
+                    "{:?} is only noise while {} moves: the joint has no motor, or the sensor is not connected",
                     drive.name,
                     title(joint)
                 );

@@ -27,7 +27,7 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
         let filled = every(&first).map(|k| (k, "held")).or_else(|| every(&second).map(|k| (k, "interpolated")));
         if let Some((factor, how)) = filled {
             let message = format!(
-                "{:?} was sampled at {:.4} Hz and {how} to the {:.4} Hz of the file: its derivative is made up between",
+                "{:?} was sampled at {:.4} Hz and {how} to the {:.4} Hz of the file: its derivative between samples is an artefact",
                 signal.name,
                 rate / factor as f64,
                 rate
@@ -35,8 +35,8 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             let todo = format!("record at the sensor's own rate, or keep every {factor}th row");
             out.push(Finding::new(FindingKind::Resampled, &recording.file, &[&signal.name], message).at(&signal.joint).todo(todo));
         } else if let Some(corner) = low_passed(&values, recording.period) {
-            let message = format!("{:?} has next to no noise above {corner:.3} Hz: it was low-pass filtered, or computed", signal.name);
-            let todo = "log the raw signal beside it: a filter that works forward only delays what it passes";
+            let message = format!("{:?} has almost no noise above {corner:.3} Hz: it was low-pass filtered, or computed", signal.name);
+            let todo = "log the raw signal as well: a causal filter delays the signal";
             let finding = Finding::new(FindingKind::Filtered, &recording.file, &[&signal.name], message).at(&signal.joint);
             out.push(finding.weighing(Weight::Note).todo(todo).sure(0.9));
         }

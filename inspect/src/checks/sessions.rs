@@ -64,11 +64,13 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
                 continue;
             }
             let name = offset.recording.signals[offset.place].name.as_str();
-            let message =
-                format!("the zero of {name:?} is shifted by {shift:.4} beside the other recordings: the joint was homed elsewhere");
+            let message = format!(
+                "the zero of {name:?} is shifted by {shift:.4} against the other recordings: the joint was homed at another \
+                    position"
+            );
             let entry = advice::entry(offset.recording, offset.joint, offset.place, &format!("offset = {:.4}", -shift));
             let finding = Finding::new(FindingKind::ZeroShifted, &offset.recording.file, &[name], message).at(&offset.joint.name);
-            out.push(finding.todo(format!("in a set of its own for this file:\n{entry}")));
+            out.push(finding.todo(format!("in a separate set for this file:\n{entry}")));
         }
     }
 }

@@ -20,7 +20,7 @@ pub fn check(recording: &mut Recording, out: &mut Vec<Finding>) {
     for place in 0..recording.signals.len() {
         let found = places(&recording.signals[place]);
         if let Some(first) = found.first() {
-            out.push(told(recording, &recording.signals[place], *first, &found));
+            out.push(finding(recording, &recording.signals[place], *first, &found));
             mend(recording, place, &found);
         }
     }
@@ -79,12 +79,12 @@ fn places(signal: &Signal) -> Vec<usize> {
     if found.len() as f64 > (FEW * values.len() as f64).max(1.0) { Vec::new() } else { found }
 }
 
-fn told(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -> Finding {
+fn finding(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -> Finding {
     let values = &signal.values;
     let stream = recording.stream(signal);
     let (word, row) = (stream.row_word(), stream.row(first));
     let message = format!(
-        "{:?}: {} sample{} far off {} neighbours, the first in {word} {row}: {} where the neighbours are {} and {}",
+        "{:?}: {} sample{} far from {} neighbours, the first in {word} {row}: {} where the neighbours are {} and {}",
         signal.name,
         found.len(),
         if found.len() == 1 { " is" } else { "s are" },
@@ -98,5 +98,5 @@ fn told(recording: &Recording, signal: &Signal, first: usize, found: &[usize]) -
     finding.time_s = Some([stream.time(first), stream.time(first)]);
     let all: Vec<String> = found.iter().take(8).map(|i| stream.row(*i).to_string()).collect();
     let more = if found.len() > 8 { ", ..." } else { "" };
-    finding.todo(format!("replace or leave out {word} {}{more}: lost frames of the bus look so", all.join(", ")))
+    finding.todo(format!("replace or remove {word} {}{more}: lost bus frames look like this", all.join(", ")))
 }

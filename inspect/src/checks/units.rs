@@ -24,7 +24,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             let large = quantile(&signal.even.iter().map(|x| x.abs()).collect::<Vec<f64>>(), 0.9);
             let is_stated = signal.stated.or(signal.hint).is_some_and(|unit| unit.kind == Kind::Current);
             if large > AMPERE {
-                let message = format!("{:?} is above {large:.0} in a tenth of the samples: no joint takes as many ampere", signal.name);
+                let message = format!("{:?} is above {large:.0} in a tenth of the samples: no joint draws that many ampere", signal.name);
                 let entry = advice::entry(recording, joint, place, "unit = \"mA\"");
                 let todo = if is_stated { entry } else { format!("{entry}   # if it is mA; counts need their scale") };
                 let weight = if is_stated { Weight::Wrong } else { Weight::Note };
@@ -44,7 +44,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         // A command in the same unit makes no difference visible: the range alone shows it.
         if signal.quantity == Quantity::Position && !says_unit && span(&signal.even) > TURNS {
             let turns = span(&signal.even) / std::f64::consts::TAU;
-            let message = format!("{:?} runs over {turns:.1} turns if it is in radians: it looks like degrees", signal.name);
+            let message = format!("{:?} spans {turns:.1} turns if it is in radians: it looks like degrees", signal.name);
             let entry = advice::entry(recording, joint, place, "unit = \"deg\"");
             out.push(Finding::new(FindingKind::WrongUnit, &recording.file, &[&signal.name], message).at(&joint.name).todo(entry).sure(0.9));
         }

@@ -73,8 +73,8 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             );
             out.push(new(FindingKind::VelocityLag, message).todo(todo));
         } else if lag.abs() > UNSURE_S.max(recording.period) {
-            let message = format!("{:?} is {:.0} ms beside the derivative of {:?}", names[0], 1e3 * lag, names[1]);
-            out.push(new(FindingKind::VelocityLag, message).weighing(Weight::Note).todo("nothing; the interval holds 0").sure(0.5));
+            let message = format!("{:?} is shifted by {:.0} ms against the derivative of {:?}", names[0], 1e3 * lag, names[1]);
+            out.push(new(FindingKind::VelocityLag, message).weighing(Weight::Note).todo("nothing; the interval contains 0").sure(0.5));
         }
     }
 }
@@ -93,7 +93,7 @@ fn no_derivative(recording: &Recording, joint: &Joint, band: &Band, names: &[&st
     let explained = |u: &[f64], y: &[f64]| follow(u, y, lags).map_or(0.0, |found| found.explained);
     let size: Vec<f64> = rate.iter().map(|x| x.abs()).collect();
     if explained(&size, &told) > EXPLAINED {
-        let message = format!("{:?} is the size of the derivative of {:?}: it was logged without its sign", names[0], names[1]);
+        let message = format!("{:?} is the absolute value of the derivative of {:?}: it was logged without its sign", names[0], names[1]);
         return new(FindingKind::Rectified, message).todo("leave the velocity out of the set: it is computed from the position");
     }
     plain()

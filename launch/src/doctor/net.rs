@@ -68,7 +68,7 @@ fn multicast(interface: &Interface) -> Finding {
     match heard() {
         Ok(true) => Finding::fine(
             PART,
-            format!("{name} sends to {GROUP} and hears itself; whether the network carries it only another host can tell"),
+            format!("{name} sends to {GROUP} and receives its own messages; only another host can check whether the network forwards them"),
         ),
         Ok(false) => Finding::weak(PART, format!("what {name} sends to {GROUP} does not come back: a firewall?"), advice),
         Err(e) => Finding::weak(PART, format!("{name} cannot send to {GROUP}: {e}; is there a route?"), advice),
@@ -80,7 +80,7 @@ fn buffers() -> Finding {
     let read = |name: &str| std::fs::read_to_string(format!("/proc/sys/net/core/{name}")).ok().and_then(|t| t.trim().parse::<u64>().ok());
     // In a network namespace the limits may not be shown; then what a socket gets is asked.
     let Some(limit) = read("rmem_max").or_else(granted) else {
-        return Finding::weak(PART, "the system does not tell their limit", "raise net.core.rmem_max to 8388608 if samples are lost");
+        return Finding::weak(PART, "the system does not report their limit", "raise net.core.rmem_max to 8388608 if samples are lost");
     };
     if limit < BUFFER_WANTED {
         let advice = "`sysctl -w net.core.rmem_max=8388608`; a node or recorder that is held up loses best-effort samples earlier";
@@ -108,7 +108,8 @@ fn ports(domain: u16) -> Finding {
     let taken = (0..12).filter(|slot| UdpSocket::bind(("0.0.0.0", first + 2 * slot)).is_err()).count();
     let found = format!("ROS domain {domain}: {taken} of its first 12 ports are taken");
     if taken > 6 {
-        let advice = "other programs speak in this domain on this host; a graph of six nodes would not find itself without multicast: take another --domain";
+        let advice = "other programs use this domain on this host; without multicast the six nodes of a graph would not find each other: \
+            choose another --domain";
         return Finding::weak("domain", found, advice);
     }
     Finding::fine("domain", found)
@@ -117,8 +118,8 @@ fn ports(domain: u16) -> Finding {
 /// What holds of every run, whoever is in the domain.
 fn strangers(domain: u16) -> Finding {
     let found = format!(
-        "a run takes messages of its own nodes alone; anybody in ROS domain {domain} can read what it sends, and can end it by sending on its topics \
-         (docs/security.md)"
+        "a run accepts only messages of its own nodes; anybody in ROS domain {domain} can read what it sends, and can end it by sending \
+         on its topics (docs/security.md)"
     );
     Finding::fine("strangers", found)
 }
@@ -143,10 +144,10 @@ fn heard(domain: u16, listen_s: f64) -> Finding {
     match (list(true), list(false)) {
         (here, elsewhere) if here.is_empty() => Finding::weak(
             "others",
-            format!("announce themselves elsewhere: {elsewhere}"),
+            format!("announce themselves in other domains: {elsewhere}"),
             format!("this host is in domain {domain}: see ROS_DOMAIN_ID"),
         ),
         (here, elsewhere) if elsewhere.is_empty() => Finding::fine("others", format!("in this domain: {here}")),
-        (here, elsewhere) => Finding::fine("others", format!("in this domain: {here}; elsewhere: {elsewhere}")),
+        (here, elsewhere) => Finding::fine("others", format!("in this domain: {here}; in other domains: {elsewhere}")),
     }
 }

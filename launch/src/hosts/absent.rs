@@ -17,7 +17,7 @@ impl Round {
         for (host, other) in &self.others {
             match other.heard {
                 None => missing.push(self.why_absent(host, &overheard)),
-                Some(_) if other.lost => missing.push(format!("host {host}: is not heard any more")),
+                Some(_) if other.lost => missing.push(format!("host {host}: no longer responds")),
                 Some(_) if !other.ready && other.missing.is_empty() => {
                     missing.push(format!("host {host}: is there, its nodes are still starting"))
                 }
@@ -27,7 +27,7 @@ impl Round {
             }
         }
         if missing.is_empty() && here.ready && self.name != self.leader {
-            missing.push(format!("host {}: has not said when to start", self.leader));
+            missing.push(format!("host {}: has not sent the start time", self.leader));
         }
         let elsewhere = overheard.iter().filter(|(domain, _)| *domain != self.network.domain);
         if self.others.values().any(|o| o.heard.is_none()) {
@@ -48,7 +48,7 @@ impl Round {
         let over = used.iter().map(|i| format!("{} ({})", i.address, i.name)).collect::<Vec<_>>().join(", ");
         let domain = self.network.domain;
         let why = if self.foreign {
-            "somebody speaks there who does not have the same secret: is the file of --secret the same on both?".to_string()
+            "a program there has another secret: is the file of --secret the same on both hosts?".to_string()
         } else if !used.iter().any(|i| !i.loopback) {
             "only the loopback is up here: connect the network or name another --interface".to_string()
         } else if self.network.peers.is_empty() && !used.iter().any(|i| i.multicast && !i.loopback) {
@@ -62,9 +62,10 @@ impl Round {
         } else {
             let peers = self.network.peers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
             format!(
-                "is `backdrive run ... --host {host}` started there, with the same ROS_DOMAIN_ID? It is looked for at {peers} and by multicast"
+                "is `backdrive run ... --host {host}` started there, with the same ROS_DOMAIN_ID? It is searched for at {peers} and by \
+                    multicast"
             )
         };
-        format!("host {host}: not heard in ROS domain {domain} on {over}; {why}")
+        format!("host {host}: does not respond in ROS domain {domain} on {over}; {why}")
     }
 }

@@ -287,7 +287,7 @@ impl Round {
     /// Reported so that a person knows; nothing of it is accepted.
     fn hear_foreign(&mut self) {
         if !std::mem::replace(&mut self.foreign, true) {
-            self.event(1, "host_secret", "somebody who does not have this run's secret speaks as a host; it is not heard");
+            self.event(1, "host_secret", "a program without this run's secret sends as a host; it is ignored");
         }
     }
 
@@ -302,7 +302,7 @@ impl Round {
         };
         self.session.known.others = self.others.iter().filter_map(of).collect();
         if let Err(e) = self.session.known.write(&self.session.path) {
-            self.event(2, "host_unknown", &format!("the nodes cannot be told of host `{host}`, and refuse it: {e}"));
+            self.event(2, "host_unknown", &format!("the nodes cannot be informed about host `{host}`, and refuse it: {e}"));
         }
     }
 
@@ -329,11 +329,7 @@ impl Round {
                 if other.speaker.is_some() && !is_same && lives {
                     // The one that was here first is the host, until it is not heard any more.
                     if self.stranger.replace(host.clone()).is_none() {
-                        self.event(
-                            2,
-                            "host_twice",
-                            &format!("two programs run as host `{host}`; the second is not heard: end one of them"),
-                        );
+                        self.event(2, "host_twice", &format!("two programs run as host `{host}`; the second is ignored: end one of them"));
                     }
                     return;
                 }
@@ -353,7 +349,7 @@ impl Round {
                     self.take_for(&host, speaker);
                 }
                 if known && (returns || was_lost) {
-                    self.event(0, "host_back", &format!("host `{host}` is heard again"));
+                    self.event(0, "host_back", &format!("host `{host}` responds again"));
                 }
                 if left {
                     self.event(0, "host_left", &format!("host `{host}` has ended its run"));
@@ -446,7 +442,7 @@ impl Round {
             }
         }
         for host in lost {
-            self.event(2, "host_lost", &format!("host `{host}` is not heard any more; its nodes may still run"));
+            self.event(2, "host_lost", &format!("host `{host}` no longer responds; its nodes may still run"));
         }
     }
 

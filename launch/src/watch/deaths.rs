@@ -138,7 +138,7 @@ impl Supervisor {
         }
         let (name, steps) = (slot.plan.label(), slot.steps());
         if !self.plan.realtime() && self.plan.timing.steps.is_none_or(|planned| steps < planned) {
-            self.tell(1, "ended_early", format!("`{name}` has ended by itself after {steps} steps, and the others with it"));
+            self.tell(1, "ended_early", format!("`{name}` ended on its own after {steps} steps, and the others with it"));
             self.cause.get_or_insert(Cause::EndedEarly { node: name, steps });
         }
         if !self.plan.realtime() || self.plan.timing.steps.is_some_and(|planned| steps >= planned) {

@@ -103,7 +103,7 @@ impl Supervisor {
         }
         self.slots[index].heard = now;
         if std::mem::take(&mut self.slots[index].silent) {
-            self.tell(0, "node_back", format!("`{}` is heard again", self.slots[index].plan.label()));
+            self.tell(0, "node_back", format!("`{}` responds again", self.slots[index].plan.label()));
         }
         match notice.heard {
             Heard::Said(FromNode::Created) => self.slots[index].created = true,
@@ -130,7 +130,7 @@ impl Supervisor {
             Heard::Stray(line) => {
                 if !std::mem::replace(&mut self.slots[index].stray, true) {
                     let name = self.slots[index].plan.label();
-                    let text = format!("`{name}` writes lines on standard output that are not of the protocol; they are shown here");
+                    let text = format!("`{name}` writes lines to standard output that are not part of the protocol; they are shown here");
                     self.tell(1, "stray_output", text);
                 }
                 self.pass_on(index, &line, now);

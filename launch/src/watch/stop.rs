@@ -11,9 +11,11 @@ use std::time::Instant;
 impl Supervisor {
     pub(crate) fn signalled(&mut self, signal: Signal) {
         match signal {
-            Signal::SIGTSTP => self.screen.line("a run cannot be suspended: its loop would go on unwatched; Ctrl-C stops it".to_string()),
+            Signal::SIGTSTP => {
+                self.screen.line("a run cannot be suspended, because its loop would continue unsupervised; Ctrl-C stops it".to_string())
+            }
             Signal::SIGINT if self.stopping => {
-                self.screen.line("killing what is left".to_string());
+                self.screen.line("killing the remaining processes".to_string());
                 self.kill();
             }
             _ => {

@@ -99,7 +99,7 @@ impl Supervisor {
                     let text = match stopped {
                         Some(pid) => format!("`{}` has been stopped (SIGSTOP); `kill -CONT {pid}` continues it", slot.plan.label()),
                         None if self.plan.realtime() => {
-                            format!("`{}` has not been heard for {} s; it may hang", slot.plan.label(), SILENCE.as_secs())
+                            format!("`{}` has not responded for {} s; it may hang", slot.plan.label(), SILENCE.as_secs())
                         }
                         None => return,
                     };

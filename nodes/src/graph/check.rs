@@ -90,13 +90,15 @@ fn slaves_are_driven(graph: &Graph, of_node: &OfNode, of_connection: &OfConnecti
             }
             (Some(true), Some(command), _) => {
                 let message = format!(
-                    "the model \"{name}\" is driven by a force and hears no command; connect the command to the input \"command\" of its controller"
+                    "the model \"{name}\" is driven by a force and takes no command; connect the command to the input \"command\" of its \
+                        controller"
                 );
                 return Err(of_connection(command, message));
             }
             (Some(false), _, Some(force)) => {
                 let message = format!(
-                    "the model \"{name}\" follows commands and hears no force; take a model whose feedback is a force, or connect its command alone"
+                    "the model \"{name}\" follows commands and takes no force; use a model whose feedback is a force, or connect only its \
+                        command"
                 );
                 return Err(of_connection(force, message));
             }

@@ -71,8 +71,8 @@ impl Sources<'_> {
             Some(text) => text.to_owned(),
             None if self.files.are_on_disk() || self.chosen.contains(&name) => read_text(path)?,
             None => {
-                let what = "which the bag does not hold. Only what a bag holds is read for it, so nothing was opened; exchange the part with an option, \
-                            or record the run again";
+                let what = "which is not in the bag. Files outside a bag are never read; exchange the part with an option, or record the \
+                            run again";
                 return Err(FileError::whole(&self.of, format!("its graph names the file \"{name}\", {what}")));
             }
         };

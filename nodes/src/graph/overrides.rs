@@ -168,7 +168,7 @@ impl Overrides {
                 }
             }
             if !found && !matches!(option, "--sensors" | "--limits") {
-                return Err(FileError::whole(name, format!("has no {} node, so {option} means nothing here", kind.name())));
+                return Err(FileError::whole(name, format!("has no {} node, so {option} has no effect; omit it", kind.name())));
             }
         }
         of_master.write(doc, name)
@@ -196,7 +196,7 @@ impl OfMaster {
         let of = |node: &toml_edit::Table, key: &str| node.get(key).and_then(Item::as_str).map(str::to_string);
         let master = node_tables(doc).find(|node| is(node, NodeKind::Master)).map(|node| (of(node, "model"), of(node, "grip")));
         let Some((Some(model), grip)) = master else {
-            return Err(FileError::whole(name, format!("has no master with a model, so {option} means nothing here")));
+            return Err(FileError::whole(name, format!("has no master with a model, so {option} has no effect; omit it")));
         };
         let mut found = false;
         for node in node_tables(doc).filter(|node| is(node, NodeKind::Canceller)) {
@@ -210,7 +210,7 @@ impl OfMaster {
         }
         match found {
             true => Ok(()),
-            false => Err(FileError::whole(name, format!("has no canceller node, so {option} means nothing here"))),
+            false => Err(FileError::whole(name, format!("has no canceller node, so {option} has no effect; omit it"))),
         }
     }
 }

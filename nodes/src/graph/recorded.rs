@@ -82,7 +82,8 @@ impl Recorded {
         for (index, line) in lines {
             let cells: Vec<&str> = line.split(',').map(str::trim).collect();
             let wrong = |what: &str| format!("{}:{}: {what}", self.file, index + 1);
-            let t = cells.get(time).and_then(|c| c.parse::<f64>().ok()).filter(|t| t.is_finite()).ok_or_else(|| wrong("t is no number"))?;
+            let t =
+                cells.get(time).and_then(|c| c.parse::<f64>().ok()).filter(|t| t.is_finite()).ok_or_else(|| wrong("t is not a number"))?;
             let value = cells.get(force).ok_or_else(|| wrong("has fewer cells than the heading"))?;
             let value = value.parse::<f64>().ok().filter(|f| f.is_finite()).unwrap_or(0.0);
             if rows.last().is_some_and(|last| t <= last.0) {

@@ -15,7 +15,7 @@ pub(super) fn put_coupling(doc: &mut DocumentMut, law: &str, file: &str) -> Resu
     let named = |kind: &str| nodes().find(|n| word(n, "kind").as_deref() == Some(kind)).and_then(|n| word(n, "name"));
     let (coupling, scaling, master) = (named("coupling"), named("scaling"), named("master"));
     let Some(name) = coupling.clone().or(scaling) else {
-        return Err(FileError::whole(file, "has neither a coupling nor a scaling node, so --coupling means nothing here".to_string()));
+        return Err(FileError::whole(file, "has neither a coupling nor a scaling node, so --coupling has no effect; omit it".to_string()));
     };
     let tables = doc.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
     for node in tables.into_iter().flat_map(ArrayOfTables::iter_mut).filter(|n| word(n, "name").as_ref() == Some(&name)) {

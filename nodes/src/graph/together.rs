@@ -35,10 +35,10 @@ fn obstacle(graph: &Graph, group: &[usize]) -> Option<String> {
     let first = nodes.first()?;
     for node in &nodes {
         if node.kind == NodeKind::Recorder {
-            return Some(format!("\"{}\" is a recorder, which hears every topic from a process of its own; leave it out", node.name));
+            return Some(format!("\"{}\" is a recorder, which receives every topic in its own process; remove it", node.name));
         }
         if node.command.is_some() {
-            return Some(format!("\"{}\" is a program of your own (command), which is a process of its own; leave it out", node.name));
+            return Some(format!("\"{}\" is an external program (command), which needs its own process; remove it", node.name));
         }
         if node.host != first.host {
             let host = |n: &Node| n.host.clone().unwrap_or_else(|| "any host".to_string());
@@ -48,7 +48,7 @@ fn obstacle(graph: &Graph, group: &[usize]) -> Option<String> {
         if node.restart != first.restart {
             let (with, without) = if node.restart { (node, first) } else { (first, node) };
             let told = "both or neither, for their process is started again as a whole";
-            return Some(format!("\"{}\" has restart = true and \"{}\" has not: {told}", with.name, without.name));
+            return Some(format!("\"{}\" has restart = true and \"{}\" does not: {told}", with.name, without.name));
         }
     }
     // Reached from the first along connections within the group, whichever way they lead.

@@ -40,7 +40,7 @@ pub enum RunError {
         reason: String,
     },
     /// A recording lacks messages.
-    #[error("{lost} messages lost; the bag says of which topics")]
+    #[error("{lost} messages lost; the bag lists their topics")]
     Incomplete {
         /// How many.
         lost: u64,

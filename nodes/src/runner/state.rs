@@ -51,7 +51,7 @@ impl Runner {
             return Err(refuse(&empty.name, "it has no stage".into()));
         }
         if plans.is_empty() || !(timing.rate_hz.is_finite() && timing.rate_hz > 0.0) {
-            return Err(refuse(&names.join("+"), format!("a rate of {} Hz cannot be kept", timing.rate_hz)));
+            return Err(refuse(&names.join("+"), format!("a rate of {} Hz is not possible", timing.rate_hz)));
         }
         let order: Vec<(usize, usize)> = match plans.as_slice() {
             [alone] => (0..alone.stages.len()).map(|stage| (0, stage)).collect(),

@@ -6,14 +6,18 @@ use backdrive_stability::outcome::Outcome;
 
 /// Headings of the table, with what they mean on the page.
 pub const COLUMNS: [(&str, &str); 8] = [
-    ("law", "what stands between master and slave"),
-    ("edge", "loop gain μλ at which the loop stops being stable; > where it is stable at every gain searched, or a clamp comes first"),
-    ("at the gain", "what the loop does at the gain of the comparison"),
-    ("shown", "stiffness that the hand is shown in the push over μλ times the wall's; 100 % is transparent"),
-    ("drag", "force against the hand per velocity in free motion, at the master"),
-    ("off free", "slave beside μ times the master before contact, root mean square"),
-    ("off contact", "the same in contact; on a stiff wall most of it is the wall"),
-    ("effort", "force on the master in contact, root mean square"),
+    ("law", "the coupling between master and slave"),
+    (
+        "limit",
+        "stability limit: the loop gain μλ above which the loop is not stable; > if it is stable at every gain searched, or a clamp \
+        acts first",
+    ),
+    ("at the gain", "the motion at the gain of the comparison"),
+    ("stiffness", "stiffness displayed to the hand in contact, relative to μλ times the wall's; 100 % is transparent"),
+    ("drag", "resisting force per velocity in free motion, at the master"),
+    ("error, free", "slave position minus μ times the master's before contact, rms"),
+    ("error, contact", "the same in contact; on a stiff wall most of it is due to the wall"),
+    ("effort", "force on the master in contact, rms"),
 ];
 
 /// The critical gain in a word.

@@ -13,9 +13,9 @@ use compared::Compared;
 /// The terms of the page.
 const TERMS: [(&str, &str); 4] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("edge", "the μλ at which the loop stops being stable in the hand's push on the wall"),
-    ("link", "what packets between master and slave go through: the same delay, jitter and loss each way"),
-    ("canceller", "the law direct on a motion from which the master's own answer to the reflected force is taken out"),
+    ("limit", "the μλ above which the loop is not stable while the hand presses on the wall"),
+    ("link", "delay, jitter and loss of packets between master and slave, the same each way"),
+    ("canceller", "the law direct, with the master's response to the reflected force subtracted from the motion"),
 ];
 
 /// A quantity of a cell, for one curve of the picture.
@@ -24,7 +24,7 @@ type Of = fn(&Cell) -> Option<f64>;
 /// The page.
 pub fn page(compared: &Compared) -> Page {
     let [mu, lambda] = compared.gains;
-    let mut page = Page::new("Laws between master and slave");
+    let mut page = Page::new("Comparison of coupling laws");
     let (tone, sentence) = headline(compared);
     page.lead(tone, &sentence);
     page.text(&format!("{}: {}", compared.session, compared.title));
@@ -32,19 +32,19 @@ pub fn page(compared: &Compared) -> Page {
         page.note(note);
     }
     if compared.cells.len() < compared.asked {
-        page.warning(&format!("It was stopped: {} of {} were done.", compared.cells.len(), compared.asked));
+        page.warning(&format!("Interrupted: {} of {} comparisons were done.", compared.cells.len(), compared.asked));
     }
-    page.section("Over the delay of the link");
+    page.section("Against the delay of the link");
     if let Some(figure) = picture(compared) {
         let caption = format!(
-            "Edge above: higher is better; where no edge was found the gain up to which it was stable is drawn. Below it, at μλ = {}: the share of \
-             the wall's stiffness that the hand is shown while it pushes (100 % is transparent; none is told where the loop does not rest), the \
-             drag in free motion, and how far the slave is from where it shall be before contact.",
+            "Top: the stability limit (higher is better); if none was found, the highest gain tried. Below, at μλ = {}: the displayed \
+             share of the wall's stiffness (100 % is transparent; missing if the loop does not come to rest), the drag in free motion, \
+             and the position error of the slave before contact.",
             number(mu * lambda)
         );
         page.figure(figure, &caption);
     } else {
-        page.text("No delay was compared, so there is nothing to draw over it.");
+        page.text("No delay was compared, so there is no figure.");
     }
     page.section("All conditions");
     let mut table = Table::new(std::iter::once("link").chain(COLUMNS.map(|c| c.0)));
@@ -59,7 +59,7 @@ pub fn page(compared: &Compared) -> Page {
         table.push(cells);
     }
     page.table(table.caption(&format!(
-        "At μ = {}, λ = {}. Edges were looked for up to μλ = {}, to within 5 %.",
+        "At μ = {}, λ = {}. Stability limits were searched up to μλ = {}, to within 5 %.",
         number(mu),
         number(lambda),
         number(compared.highest)
@@ -121,10 +121,11 @@ fn picture(compared: &Compared) -> Option<Figure> {
         })
     };
     let edge: Of = |c| c.critical_gain.or((c.stable_up_to > 0.0).then_some(c.stable_up_to));
-    let first = Plot::new("Edge").x_axis("delay each way", "ms").y_axis("edge μλ", "").y_log().height(230.0);
-    let share = Plot::new("Shown stiffness").y_axis("of the wall's", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
+    let first = Plot::new("Stability limit").x_axis("delay each way", "ms").y_axis("stability limit μλ", "").y_log().height(230.0);
+    let share =
+        Plot::new("Displayed stiffness").y_axis("of the wall's", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
     let drag = Plot::new("Drag in free motion").y_axis("drag", "N s/m").include_y(0.0).height(180.0);
-    let off = Plot::new("Slave beside master in free motion").y_axis("off", "m").include_y(0.0).height(180.0);
+    let off = Plot::new("Position error of the slave in free motion").y_axis("error", "m").include_y(0.0).height(180.0);
     Some(Figure::stacked([
         plot(first, edge),
         plot(share, |c| c.measures.stiffness_share.map(|s| 100.0 * s)),

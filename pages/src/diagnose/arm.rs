@@ -31,48 +31,53 @@ pub fn page(shown: &Shown) -> Page {
     let held = !problem.held_out.is_empty();
     let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
-    page.text(&summary(verdict, held));
     todo(&mut page, steps);
+    page.text(&summary(verdict, held));
     for note in *notes {
         page.note(&sentence(note));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(4) {
         page.warning(&sentence(&format!("{}: {}", remark.place, remark.message)));
     }
-    tables::findings(&mut page, verdict);
     page.section("What remains of each joint's torque");
     figures::remaining(&mut page, verdict, held);
-    tables::joints(&mut page, verdict);
-    page.section(if held { "Torque on a log that no fit has seen" } else { "Torque on a log, as fitted" });
+    tables::findings(&mut page, verdict);
+    page.details("Shares of the torque of each joint", |inside| tables::joints(inside, verdict));
+    page.section(if held { "Torque on a held-out log" } else { "Torque on a log, as fitted" });
     figures::torque(&mut page, &found.drawn);
     page.section("Friction of each joint");
     figures::friction(&mut page, &found.drawn);
-    page.section("Inertial parameters");
-    tables::base_parameters(&mut page, verdict);
-    tables::moved(&mut page, verdict);
-    page.section("What to record next");
+    page.section("Next recording");
     figures::next(&mut page, verdict, &found.drawn);
-    page.section("What was tried");
-    tables::tried(&mut page, &found.tried);
-    page.section("The logs themselves");
-    tables::audit(&mut page, problem, verdict);
+    page.section("Details");
+    page.details("Inertial parameters", |inside| {
+        tables::base_parameters(inside, verdict);
+        tables::moved(inside, verdict);
+    });
+    page.details("All hypotheses", |inside| tables::tried(inside, &found.tried));
+    page.details("Checks of the logs", |inside| tables::audit(inside, problem, verdict));
     ending(&mut page, &TERMS);
     page
 }
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 8] = [
-    ("torque", "of the motor, seen at the joint; of a joint that slides its force"),
-    ("residual", "measured torque less what a model takes for the measured motion, both through the same filter without delay"),
+    ("torque", "of the motor, at the joint; for a sliding joint its force"),
+    ("residual", "measured torque minus the model's torque for the measured motion, both through the same zero-phase filter"),
     ("as given", "the model's file, unchanged"),
-    ("refitted", "the same structure, its inertial parameters and numbers of friction fitted to the logs"),
-    ("diagnosed", "the structure with the physics that was found, all numbers fitted"),
-    ("held out", "a log that no fit has seen"),
+    ("refitted", "the same structure, its inertial and friction parameters fitted to the logs"),
+    ("diagnosed", "the structure with the effects found, all parameters fitted"),
+    ("held out", "a log that no fit uses"),
     (
         "closed loop",
-        "the model simulated with the measured torque, and a loop that adds what it takes to keep the measured motion: the share is what it added",
+        "a simulation with the measured torque and a controller that keeps the measured motion; the share of torque that the controller \
+            adds",
     ),
-    ("base parameter", "a combination of masses, centres and inertias that the torque of this arm can show; other combinations it cannot"),
+    (
+        "base parameter",
+        "a combination of masses, centres of mass and inertias that influences the torque of this arm; only such \
+        combinations can be identified",
+    ),
 ];
 
 /// How far the torque is explained, in all.
@@ -94,7 +99,7 @@ fn summary(verdict: &Verdict, held: bool) -> String {
         })
         .collect();
     format!(
-        "Of the rms torque on the {on} remain at {}. Torque and models were compared below {} Hz.",
+        "Unexplained share of the rms torque on the {on}: {}. Torque and models were compared below {} Hz.",
         joints.join("; at "),
         backdrive_report::number(arm.corner_hz)
     )

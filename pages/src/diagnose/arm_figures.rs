@@ -35,7 +35,8 @@ pub(super) fn remaining(page: &mut Page, verdict: &Verdict, held: bool) {
     page.figure(
         plot,
         &format!(
-            "On {on}: what the models leave of the measured torque, and what a loop has to add so that the simulated arm keeps the measured motion."
+            "On {on}: the share of the measured torque that the models do not explain, and the share that a controller adds to keep the \
+                simulated arm on the measured motion."
         ),
     );
 }
@@ -75,7 +76,7 @@ pub(super) fn friction(page: &mut Page, drawn: &Drawn) {
         }
         let step = friction.velocity.len().div_ceil(POINTS).max(1);
         let thin = |x: &[f64]| x.iter().step_by(step).copied().collect::<Vec<f64>>();
-        let cloud = Series::points("asked for by the logs", &thin(&friction.velocity), &thin(&friction.torque));
+        let cloud = Series::points("required by the logs", &thin(&friction.velocity), &thin(&friction.torque));
         let law = Series::line("fitted law", &friction.line_velocity, &friction.line);
         let plot = Plot::new(&joint.name)
             .x_axis("velocity", joint.units[1])
@@ -85,22 +86,22 @@ pub(super) fn friction(page: &mut Page, drawn: &Drawn) {
         figures.push(plot.into());
     }
     if figures.is_empty() {
-        page.text("No joint moves for long enough to draw its friction.");
+        page.text("No joint moves long enough to show its friction.");
         return;
     }
     let by_load: Vec<&str> = drawn.joints.iter().filter(|j| j.friction.by_load).map(|j| j.name.as_str()).collect();
     let load = match by_load.is_empty() {
         true => String::new(),
         false => format!(
-            " Friction that grows with the load (at {}) is drawn at the mean load, and its points scatter about it.",
+            " Friction that grows with the load (at {}) is drawn at the mean load, and its points scatter around it.",
             by_load.join(", ")
         ),
     };
     page.figure(
         Figure::beside(figures),
         &format!(
-            "Grey: torque that remains on all logs when a joint's own friction and constant torque alone are left out of the diagnosed model, while it \
-             moves. Orange: what the diagnosed model has there.{load}"
+            "Grey: torque in motion that the diagnosed model without the joint's friction and constant torque does not explain. Orange: \
+             friction and constant torque of the diagnosed model.{load}"
         ),
     );
 }
@@ -122,6 +123,6 @@ pub(super) fn next(page: &mut Page, verdict: &Verdict, drawn: &Drawn) {
             plot = plot.line(&joint.name, &drawn.next_time, position);
         }
         let seconds = drawn.next_time.last().copied().unwrap_or(0.0);
-        page.figure(plot, &format!("Positions to track, a period of {} s; it repeats without a jump.", number(seconds.round())));
+        page.figure(plot, &format!("Positions to track, a period of {} s; it repeats without a discontinuity.", number(seconds.round())));
     }
 }

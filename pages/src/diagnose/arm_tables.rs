@@ -21,9 +21,9 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
         return;
     }
     let replacing = all.iter().any(|f| !f.replaces.is_empty());
-    let mut headers = vec!["missing", "where", "numbers"];
+    let mut headers = vec!["missing", "where", "parameters"];
     headers.extend(replacing.then_some("in place of"));
-    headers.extend(["confidence", "or instead"]);
+    headers.extend(["confidence", "alternatives"]);
     let simulated = all.iter().any(|f| f.closed_loop.is_some());
     headers.extend(simulated.then_some("closed loop: correction with it, of that without"));
     let mut table = Table::new(headers);
@@ -76,8 +76,8 @@ pub(super) fn joints(page: &mut Page, verdict: &Verdict) {
         ]);
     }
     page.table(table.caption(
-        "Shares of the rms torque (N m, N of a joint that slides). At rest dry friction is anything between its levels, so what the diagnosed model leaves \
-         is told for the time in which the joint moves, too.",
+        "Shares of the rms torque (N m, N of a joint that slides). At rest dry friction is undetermined between its levels, so the \
+         residual of the diagnosed model is also given for the time in motion.",
     ));
     for open in arm.joints.iter().filter_map(unexplained) {
         page.text(&sentence(&format!("not explained: {open}")));
@@ -106,47 +106,47 @@ pub(super) fn base_parameters(page: &mut Page, verdict: &Verdict) {
         ]);
     }
     page.table(table.caption(
-        "m, mx, Ixx, ... with the number of the joint: mass, mass times centre, inertia about the joint's frame. Marked where the interval does not hold the \
-         file's value.",
+        "m, mx, Ixx, ... with the number of the joint: mass, mass times centre, inertia about the joint's frame. Marked if the interval \
+         does not contain the file's value.",
     ));
 }
 
 /// Numbers of the model that moved beyond their interval.
 pub(super) fn moved(page: &mut Page, verdict: &Verdict) {
     if verdict.parameters.is_empty() {
-        page.text("No number of the model moved beyond its interval.");
+        page.text("No parameter of the model changed beyond its interval.");
         return;
     }
-    let mut table = Table::new(["number of the model", "nominal", "fitted", "95 % interval", "moved, in sd"]);
+    let mut table = Table::new(["parameter of the model", "nominal", "fitted", "95 % interval", "moved, in sd"]);
     for (name, moved) in &verdict.parameters {
         let sd = moved.moved_sd.map_or("–".to_string(), number);
         table.push([name.clone(), number(moved.nominal), number(moved.value), interval(&moved.ci95), sd]);
     }
-    page.table(table.caption("Numbers of the model that moved beyond their interval, beside what was found."));
+    page.table(table.caption("Parameters of the model that changed beyond their interval, besides the findings."));
 }
 
 /// What the search fitted in full.
 pub(super) fn tried(page: &mut Page, tried: &[Tried]) {
     if tried.is_empty() {
-        page.text("No physics promised enough beside the nominal model to be fitted in full.");
+        page.text("No effect promised enough improvement of the nominal model to be fitted in full.");
         return;
     }
     let mut all: Vec<&Tried> = tried.iter().collect();
     all.sort_by(|a, b| b.taken.cmp(&a.taken).then(b.worth.total_cmp(&a.worth)));
     let table = |part: &[&Tried]| {
-        let mut table = Table::new(["physics", "where", "worth", "unseen stretches, in sd", ""]);
+        let mut table = Table::new(["physics", "where", "worth", "held-out segments, in sd", ""]);
         for one in part {
             table.push([
                 Cell::from(words(&one.physics)),
                 said::place(&one.place).into(),
                 number(one.worth).into(),
                 one.unseen.map_or("–".to_string(), number).into(),
-                if one.taken { Cell::tone("taken up in its round", Tone::Good) } else { Cell::from("not taken up") },
+                if one.taken { Cell::tone("accepted in its round", Tone::Good) } else { Cell::from("not accepted") },
             ]);
         }
         table.caption(
-            "Worth: rise of twice the log evidence beside what had been found until then; more than 10 is asked for. Unseen stretches: how much better those \
-             are predicted that the fit has not seen. What was taken up can be exchanged or taken off later.",
+            "Worth: increase of twice the log evidence; more than 10 is required. Held-out segments: improvement of their prediction. An \
+             accepted effect can be exchanged or removed later.",
         )
     };
     let (first, rest) = all.split_at(all.len().min(SHOWN));
@@ -170,10 +170,13 @@ pub(super) fn audit(page: &mut Page, problem: &Problem, verdict: &Verdict) {
     }
     page.table(files);
     if verdict.audit.is_empty() {
-        page.text("The logs were looked at for units, signs, swapped columns, told velocities that are no derivatives, and loads that never change: nothing was seen.");
+        page.text(
+            "The logs were checked for units, signs, swapped columns, recorded velocities that are not derivatives, and constant \
+            loads: no problem was found.",
+        );
         return;
     }
-    let mut table = Table::new(["looked at", "where", "seen", "weight"]);
+    let mut table = Table::new(["checked", "where", "seen", "weight"]);
     for remark in &verdict.audit {
         let (word, tone) = match remark.weight {
             Weight::Note => ("note", Tone::Neutral),

@@ -40,7 +40,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     if !drawn && let Some(first) = location.ranking.first() {
         map(page, found, first);
     }
-    places(page, found, location);
+    page.details("The force at every place", |inside| places(inside, found, location));
 }
 
 /// A finding's effect and place in words, as a title.
@@ -81,7 +81,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let mut map = Plot::new(&format!("{name}: {what} against {over}")).x_axis(over, &evidence.variable_unit);
     map = map.y_axis(what, &evidence.force_unit);
     let (x, y) = cloud(&evidence.traces);
-    map = map.series(Series::points("asked for by the recordings", &x, &y).colour(Colour::Muted).width(1.3));
+    map = map.series(Series::points("required by the recordings", &x, &y).colour(Colour::Muted).width(1.3));
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
     let loose = loose(main, &evidence.force_unit);
@@ -95,18 +95,18 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
         turn = turn.x_axis("displacement", &evidence.displacement_unit).y_axis(what, &evidence.force_unit);
         let cut = |x: &[f64]| x.get(part.clone()).unwrap_or(&[]).to_vec();
         let (x, y) = (cut(&main.latent.displacement), cut(&main.latent.force));
-        turn = turn.series(Series::line("asked for by the recordings", &x, &y).colour(Colour::Muted).dash(Dash::Solid));
+        turn = turn.series(Series::line("required by the recordings", &x, &y).colour(Colour::Muted).dash(Dash::Solid));
         let (x, y) = (cut(&main.law.displacement), cut(&main.law.force));
         figures.push(turn.series(Series::line("the law found", &x, &y).colour(Colour::Nth(1)).dash(Dash::Solid).outside_limits()).into());
     }
     let replaced = match evidence.replaces.is_empty() {
         true => String::new(),
-        false => format!(" The force of {}, which it takes the place of, is in both.", evidence.replaces.join(" and ")),
+        false => format!(" The force of {}, which it replaces, is in both.", evidence.replaces.join(" and ")),
     };
     page.figure(
         Figure::beside(figures),
         &format!(
-            "At {place}: grey is what the recordings ask for when this law alone is left out, orange what the law does.{replaced}{}",
+            "At {place}: grey is the force required by the recordings without this law, orange the force of the law.{replaced}{}",
             loose.as_deref().unwrap_or_default()
         ),
     );
@@ -119,8 +119,8 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let band = Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted);
     course = course.series(if loose.is_some() { band.outside_limits() } else { band });
     course = course.series(Series::line("the law found", &time, &cut(&main.law.force)).colour(Colour::Nth(1)).dash(Dash::Solid));
-    course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
-    page.figure(course, &format!("The same in time, in {}.", file_name(&main.record)));
+    course = course.series(Series::line("required by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
+    page.figure(course, &format!("The same against time, in {}.", file_name(&main.record)));
     if loose.is_none() {
         page.text(&within(main));
     }
@@ -134,8 +134,8 @@ fn loose(main: &Trace, unit: &str) -> Option<String> {
     let level = backdrive_signal::statistics::rms(&main.law.force);
     (half > level).then(|| {
         format!(
-            " Taken out of the model, this force can be told to ± {} only, more than the law itself has ({} root mean square): these sensors leave \
-             open how it is shared with the rest. That the law holds is seen in the residual above, not here.",
+            " Without the law, this force is known only to ± {}, more than the law itself ({} rms): these sensors do not separate it from \
+             the rest of the model. The evidence for the law is the residual above, not this figure.",
             si(half, unit),
             si(level, unit)
         )
@@ -152,7 +152,7 @@ fn within(main: &Trace) -> String {
     }
     let outside: Vec<usize> = known.iter().copied().filter(|k| (latent[*k] - law[*k]).abs() > 2.0 * deviation[*k]).collect();
     let share = 1.0 - outside.len() as f64 / known.len() as f64;
-    let inside = format!("Over the whole record the law lies within the 95 % interval at {} of the samples", percent(share));
+    let inside = format!("Over the whole record the law is within the 95 % interval at {} of the samples", percent(share));
     if share > 0.9 {
         return format!("{inside}.");
     }
@@ -168,14 +168,11 @@ fn within(main: &Trace) -> String {
     let off: Vec<f64> = outside.iter().map(|k| latent[*k] - law[*k]).collect();
     let size = backdrive_signal::statistics::rms(&off) / level;
     let why = if at_jumps > 0.5 {
-        format!(
-            "{} of the rest lies where the law jumps, which an estimate from sensors of finite bandwidth follows only smoothly",
-            percent(at_jumps)
-        )
+        format!("{} of the others are where the law jumps, which an estimate from sensors of finite bandwidth smooths", percent(at_jumps))
     } else {
         format!(
-            "elsewhere it is off by {} of the law's size (root mean square): the interval holds the sensors' noise alone, not what the other \
-             parts of the model leave, and the law may be only the nearest of those known",
+            "at the other samples it differs by {} of the law's rms: the interval contains only sensor noise, not errors of the rest of \
+             the model. The true law may be none of the known ones",
             percent(size)
         )
     };
@@ -238,7 +235,7 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
 fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
     let motion = found.problem.model.motion;
     let unit = if matches!(place.place, Place::Between(..)) { unit_for(motion, "N") } else { String::new() };
-    let title = format!("latent force at {}", shown(&place.place));
+    let title = format!("unknown force at {}", shown(&place.place));
     let mut figures: Vec<Figure> = Vec::new();
     for (label, column, own) in [("velocity", 0, "m/s"), ("displacement", 1, "m")] {
         let (mut x, mut y) = (Vec::new(), Vec::new());
@@ -253,7 +250,7 @@ fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
         let step = x.len().div_ceil(POINTS).max(1);
         let thin = |x: &[f64]| x.iter().step_by(step).copied().collect::<Vec<f64>>();
         let mut plot = Plot::new(&format!("{title} against {label}")).x_axis(label, &unit_for(motion, own)).y_axis("force", &unit);
-        plot = plot.series(Series::points("asked for by the recordings", &thin(&x), &thin(&y)).colour(Colour::Muted).width(1.3));
+        plot = plot.series(Series::points("required by the recordings", &thin(&x), &thin(&y)).colour(Colour::Muted).width(1.3));
         let wanted = if column == 0 { Variable::Velocity } else { Variable::Displacement };
         if let Some(law) = place.laws.iter().find(|l| l.variable == wanted && !l.curve.is_empty()) {
             let (at, mean): (Vec<f64>, Vec<f64>) = law.curve.iter().map(|p| (p.at, p.mean)).unzip();
@@ -264,7 +261,7 @@ fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
     if figures.is_empty() {
         return;
     }
-    page.figure(Figure::beside(figures), "What would have to act there so that the refitted nominal model does what was recorded.");
+    page.figure(Figure::beside(figures), "The force at this place that would make the refitted nominal model reproduce the recording.");
     if let Some(c) = &place.character {
         let mut words = vec![if c.odd_share > 0.7 {
             "odd"
@@ -275,14 +272,14 @@ fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
         }];
         words.push(if c.memory { "with memory" } else { "without memory" });
         words.push(if c.rate_dependent { "dependent on speed" } else { "independent of speed" });
-        page.text(&format!("Its class: {}; it takes {} per cycle.", words.join(", "), si(c.dissipated_per_cycle, "J")));
+        page.text(&format!("Its class: {}; it dissipates {} per cycle.", words.join(", "), si(c.dissipated_per_cycle, "J")));
     }
 }
 
 /// The ranking, and what the sensors cannot tell apart.
 fn places(page: &mut Page, found: &Diagnosis, location: &Location) {
     let mut table =
-        Table::new(["place", "explains (log-likelihood)", "behind the best", "force needed, rms", "follows best", "not told apart from"]);
+        Table::new(["place", "log-likelihood gain", "behind the best", "force needed, rms", "correlates best with", "not separated from"]);
     let top = location.ranking.first().map_or(0.0, |c| c.evidence);
     let n = location.ranking.len();
     for (index, candidate) in location.ranking.iter().enumerate().take(PLACES) {
@@ -311,14 +308,14 @@ fn places(page: &mut Page, found: &Diagnosis, location: &Location) {
     }
     let more = if n > PLACES { format!(" {} more places explain less.", n - PLACES) } else { String::new() };
     page.table(table.caption(&format!(
-        "For each place, the force there that would make the refitted nominal model do what was recorded. The first column of numbers is what \
-         that gains over no force at all; the share in the last but one is what the law explains of the force on other parts of the recordings.{more}"
+        "For each place: the force that would make the refitted nominal model reproduce the recordings. Log-likelihood gain: relative to \
+         no force. The share in the last column but one: how much of the force the law explains on other parts of the recordings.{more}"
     )));
 }
 
 fn variable_word(variable: Variable) -> &'static str {
     match variable {
-        Variable::Constant => "nothing: constant",
+        Variable::Constant => "nothing (constant)",
         Variable::Direction => "direction of motion",
         Variable::Velocity => "velocity",
         Variable::Displacement => "displacement",

@@ -72,7 +72,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         }
     }
     page.table(table.caption(&format!(
-        "Root mean square errors, as shares of each signal's standard deviation; {} is 1 in the last but one column.",
+        "Rms errors as shares of each signal's standard deviation; {} is 1 in the last column but one.",
         search.noise()
     )));
 }
@@ -107,7 +107,7 @@ fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
 
     let part = |x: &[f64]| x.get(from..to).unwrap_or(&[]).to_vec();
     let near = part(&time);
-    let mut zoom = Plot::new("Where the models part most").x_axis("time", "s").y_axis(label, &unit);
+    let mut zoom = Plot::new("Where the models differ most").x_axis("time", "s").y_axis(label, &unit);
     if let Some(given) = &given {
         zoom = zoom.series(Series::line("as given", &near, &part(given)).colour(Colour::Muted).dash(Dash::Dotted).outside_limits());
     }
@@ -123,7 +123,7 @@ fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     let floor = found.search.noise_sd.get(output).copied().unwrap_or(0.0);
     let error = |p: &Option<Vec<f64>>| p.as_ref().map(|p| measured.iter().zip(p).map(|(y, p)| y - p).collect::<Vec<f64>>());
     let (e_given, e_refitted, e_diagnosed) = (error(&given), error(&refitted), error(&diagnosed));
-    let mut left = Plot::new("Residual, in time").x_axis("time", "s").y_axis("measured less predicted", &unit);
+    let mut left = Plot::new("Residual, in time").x_axis("time", "s").y_axis("measured minus predicted", &unit);
     let mut spectrum = Plot::new("Residual, by frequency").x_axis("frequency", "Hz").y_axis("density", &per_hertz(&unit)).x_log().y_log();
     let looks = [
         ("as given", &e_given, Colour::Muted, true),
@@ -142,7 +142,7 @@ fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     spectrum = spectrum.horizontal(noise, "sensor's noise", Tone::Good);
     page.figure(
         Figure::beside([left, spectrum]),
-        &format!("{name}, {label}. What the sensor's own noise leaves is flat at the line: {} rms.", backdrive_report::si(floor, &unit)),
+        &format!("{name}, {label}. Sensor noise alone would be flat at the line: {} rms.", backdrive_report::si(floor, &unit)),
     );
 }
 

@@ -39,8 +39,8 @@ pub fn page(shown: &Shown) -> Page {
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(found.verdict.word), &sentence(&found.verdict.sentence));
-    page.text(&summary(found, adds(best)));
     todo(&mut page, shown.steps);
+    page.text(&summary(found, adds(best)));
     for note in shown.notes {
         page.note(&sentence(note));
     }
@@ -48,40 +48,37 @@ pub fn page(shown: &Shown) -> Page {
         page.warning(&sentence(&remark.to_string()));
     }
     if found.search.cut {
-        page.warning("The search was cut off by the clock (--patience) or interrupted: on another machine it may come to another verdict.");
+        page.warning("The search was cut off by the clock (--patience) or interrupted: on another machine the verdict may differ.");
     } else if found.search.exhausted {
         page.warning("The search ended before everything was tried.");
     }
     findings(&mut page, &found.verdict);
-    page.section(if found.problem.held_out.is_empty() { "Recordings, as fitted" } else { "Recordings that no fit has seen" });
+    page.section(if found.problem.held_out.is_empty() { "Recordings, as fitted" } else { "Held-out recordings" });
     held_out::section(&mut page, found, best);
-    page.section("The force that is missing");
+    page.section("The missing force");
     force::section(&mut page, found, best);
-    page.section("Every hypothesis that was tried");
-    tables::hypotheses(&mut page, found, best);
-    page.section("Parameters before and after");
-    tables::numbers(&mut page, found, best);
-    page.section("Each record by itself");
-    tables::per_record(&mut page, found);
-    page.section("The recordings themselves");
-    tables::audit(&mut page, found);
+    page.section("Details");
+    page.details("All hypotheses", |inside| tables::hypotheses(inside, found, best));
+    page.details("Parameters before and after", |inside| tables::numbers(inside, found, best));
+    page.details("Each record alone", |inside| tables::per_record(inside, found));
+    page.details("Checks of the recordings", |inside| tables::audit(inside, found));
     ending(&mut page, &TERMS);
     page
 }
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 8] = [
-    ("residual", "what was measured less what a model predicts"),
+    ("residual", "the measured signal minus the predicted signal"),
     (
         "sensor noise",
-        "standard deviation of the measuring error of an output, estimated from the recordings: a residual of 1 cannot be improved on",
+        "standard deviation of the measuring error of an output, estimated from the recordings: a residual of 1 cannot be reduced further",
     ),
     ("nrmse", "root mean square of the residual over the standard deviation of the measured signal"),
-    ("held out", "a recording that no fit has seen"),
+    ("held out", "a recording that no fit uses"),
     ("refitted", "the same structure, its parameters fitted to the recordings"),
-    ("diagnosed", "the structure with the physics that was found, all parameters fitted"),
-    ("asked for by the recordings", "the force at a place that makes the model do what was recorded when the law found there is left out"),
-    ("sd", "standard deviations of a parameter's own error"),
+    ("diagnosed", "the structure with the effects found, all parameters fitted"),
+    ("required by the recordings", "the force at a place that makes the model without the law found there reproduce the recording"),
+    ("sd", "standard deviations of a parameter's estimate"),
 ];
 
 /// How far it is explained, and where it shows.
@@ -94,8 +91,8 @@ fn summary(found: &Diagnosis, added: bool) -> String {
         // Where nothing was added, what is written as diagnosed is one of the two others.
         let diagnosed = if added { format!(", {} with the diagnosed model", percent(after)) } else { String::new() };
         text = format!(
-            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted{diagnosed}; the sensors' own \
-             noise is {}.",
+            "On {on} the error is {} of the measured signal with the model as given, {} with its parameters refitted{diagnosed}; the \
+             sensor noise is {}.",
             percent(before),
             percent(refit),
             percent(floor)
@@ -103,16 +100,16 @@ fn summary(found: &Diagnosis, added: bool) -> String {
         let beyond = |x: f64| (x * x - floor * floor).max(0.0).sqrt();
         if added && beyond(refit) > floor && after < refit {
             text.push_str(&format!(
-                " Of the error that refitting leaves beyond that noise, {} is removed.",
+                " The findings remove {} of the refitted model's error above that noise.",
                 percent(1.0 - beyond(after) / beyond(refit))
             ));
         }
     }
     if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
-        text.push_str(&format!(" It shows {}.", shows(place)));
+        text.push_str(&format!(" The missing effect appears at: {}.", shows(place)));
     }
     if let Some(errors) = errors(&verdict.error_budget) {
-        text.push_str(&format!(" What is off in the prediction is partly {errors}."));
+        text.push_str(&format!(" The prediction error is partly {errors}."));
     }
     text
 }
@@ -126,7 +123,7 @@ fn findings(page: &mut Page, verdict: &Verdict) {
     let replacing = all.iter().any(|f| !f.replaces.is_empty());
     let mut headers = vec![if verdict.word.claims() { "missing" } else { "nearest" }, "where", "parameters"];
     headers.extend(replacing.then_some("in place of"));
-    headers.extend(["confidence", "or instead"]);
+    headers.extend(["confidence", "alternatives"]);
     let mut table = Table::new(headers);
     for finding in all {
         let sure = if finding.confidence > 0.8 { Tone::Good } else { Tone::Unsure };

@@ -12,7 +12,7 @@ pub fn confidence(finding: &Finding) -> String {
     let own = supported(finding.confidence);
     match finding.family.and_then(Family::words) {
         Some(kind) if finding.family_confidence > finding.confidence + 0.1 => {
-            format!("{kind} there: {}; this law of it: {own}", supported(finding.family_confidence))
+            format!("{kind} there: {}; this law: {own}", supported(finding.family_confidence))
         }
         _ => own,
     }
@@ -24,8 +24,8 @@ fn supported(share: f64) -> String {
         s if s > 0.95 => "well supported",
         s if s > 0.8 => "supported",
         s if s > 0.4 => "weakly supported",
-        s if s > 0.05 => "hardly supported",
-        _ => "not supported by what remains",
+        s if s > 0.05 => "barely supported",
+        _ => "not supported by the residual",
     };
     format!("{word} ({})", words::share(share))
 }
@@ -40,6 +40,8 @@ pub fn alternatives(finding: &Finding) -> Vec<String> {
 fn parameter(parameter: &Parameter) -> String {
     let one = |value: f64, ci95: &Interval, unit: &str| {
         let interval = match ci95 {
+            // Three digits do not show a narrow interval.
+            [Some(low), Some(high)] if si(*low, unit) == si(*high, unit) => format!("95 %: ±{}", si(0.5 * (high - low), unit)),
             [Some(low), Some(high)] => format!("95 %: {} to {}", si(*low, unit), si(*high, unit)),
             [Some(low), None] => format!("95 %: above {}", si(*low, unit)),
             [None, Some(high)] => format!("95 %: below {}", si(*high, unit)),
@@ -49,7 +51,7 @@ fn parameter(parameter: &Parameter) -> String {
     };
     match parameter {
         Parameter::One(Estimate { value, ci95, unit, at_bound }) => {
-            format!("{}{}", one(*value, ci95, unit), if *at_bound { ", at the bound of what was tried" } else { "" })
+            format!("{}{}", one(*value, ci95, unit), if *at_bound { ", at its bound" } else { "" })
         }
         Parameter::List(list) => {
             let each = list.value.iter().zip(&list.ci95).map(|(value, ci95)| one(*value, ci95, &list.unit));
@@ -80,14 +82,14 @@ pub fn errors(budget: &[BudgetedError]) -> Option<String> {
     let told = |source: Source| match source {
         Source::Integration => "integration",
         Source::Clock => "jitter of the clock",
-        Source::Differencing => "differences of counts in the place of a velocity",
+        Source::Differencing => "differences of counts instead of a velocity",
         Source::Rounding => "rounding of the output",
-        Source::Hold => "how the input runs between samples",
+        Source::Hold => "the input between samples",
         Source::DrivingMotion => "noise of a motion that drives the model",
     };
     let large = budget.iter().filter(|error| error.noise_sd >= 0.1);
     let all: Vec<String> = large.map(|e| format!("{} {} ({})", told(e.source), number(e.noise_sd), e.output)).collect();
-    (!all.is_empty()).then(|| format!("no physics, in times the sensor noise: {}", all.join(", ")))
+    (!all.is_empty()).then(|| format!("errors that are not missing effects, in units of the sensor noise: {}", all.join(", ")))
 }
 
 /// What to record next, and the file that plays it; or why nothing would tell.
@@ -122,9 +124,9 @@ mod tests {
         assert_eq!(parameters(&finding), ["force 101 mN (95 %: 98.0 mN to 104 mN)"]);
         assert_eq!(confidence(&finding), "well supported (97 %)");
         let of_some_law = Finding { confidence: 0.13, family: Some(Family::Friction), family_confidence: 0.97, ..finding };
-        assert_eq!(confidence(&of_some_law), "dry friction there: well supported (97 %); this law of it: hardly supported (13 %)");
+        assert_eq!(confidence(&of_some_law), "dry friction there: well supported (97 %); this law: barely supported (13 %)");
         let stiff = Parameter::One(Estimate { value: 2.0, ci95: [Some(1.5), None], at_bound: true, unit: "N".to_string() });
-        assert_eq!(parameter(&stiff), "2.00 N (95 %: above 1.50 N), at the bound of what was tried");
+        assert_eq!(parameter(&stiff), "2.00 N (95 %: above 1.50 N), at its bound");
         let ci95 = vec![[Some(0.5), Some(1.5)], [Some(1.0), Some(3.0)]];
         let slip = Parameter::List(Estimates { value: vec![1.0, 2.0], ci95, unit: "N".to_string() });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
@@ -134,14 +136,15 @@ mod tests {
     fn errors_that_are_no_physics_are_told_where_they_are_large() {
         let error = |source: Source, noise_sd: f64| BudgetedError { source, output: "force".to_string(), noise_sd };
         let budget = [error(Source::Integration, 1e-9), error(Source::DrivingMotion, 0.93)];
-        let said = "no physics, in times the sensor noise: noise of a motion that drives the model 0.93 (force)";
+        let said = "errors that are not missing effects, in units of the sensor noise: noise of a motion that drives the model 0.93 \
+            (force)";
         assert_eq!(errors(&budget).map(|text| text.replace("0.930", "0.93")).as_deref(), Some(said));
         assert_eq!(errors(&budget[..1]), None);
     }
 
     #[test]
     fn where_no_experiment_would_tell_the_reason_is_told() {
-        let refused = NextExperiment::Refused(Refused { sentence: "No excitation tells them apart.".to_string() });
-        assert_eq!(next_experiment(&refused), "No excitation tells them apart.");
+        let refused = NextExperiment::Refused(Refused { sentence: "No excitation separates them.".to_string() });
+        assert_eq!(next_experiment(&refused), "No excitation separates them.");
     }
 }

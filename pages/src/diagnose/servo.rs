@@ -19,11 +19,11 @@ const POINTS: usize = 3000;
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 5] = [
-    ("free run", "the model simulated from the recorded commands alone, from where the joint stood at the first sample"),
+    ("free run", "a simulation from the recorded commands only, starting at the first recorded position"),
     ("nrmse", "root mean square of the error over the standard deviation of the recorded position"),
     ("second order", "delay, inertia, damping and offset alone, fitted to the same recordings"),
-    ("held out", "a recording that no fit has seen; where none is, each is simulated by a fit without it"),
-    ("force in rad", "over the servo's proportional gain: the angle between command and position that holds it"),
+    ("held out", "a recording that no fit uses; if there is none, each recording is simulated with a fit to the others"),
+    ("force in rad", "over the servo's proportional gain: the angle between command and position that balances it"),
 ];
 
 /// The report: `name` is the set, for the title, and `steps` what to do next.
@@ -32,8 +32,8 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
     let mut page = Page::new(&format!("Diagnosis of the servo joints of {name}"));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     let Some(servo) = &verdict.servo else { return page };
-    page.text(&sentence(&format!("{}.", servo.scale)));
     todo(&mut page, steps);
+    page.text(&sentence(&servo.scale));
     for note in &found.notes {
         page.note(&sentence(note));
     }
@@ -60,8 +60,8 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         })
         .collect();
     match rows.is_empty() {
-        true => page.text("Nothing beside delay, second order and offset."),
-        false => page.table(table(["where", "what", "numbers", "confidence", "or instead"], rows)),
+        true => page.text("Nothing in addition to delay, second order and offset."),
+        false => page.table(table(["where", "what", "parameters", "confidence", "alternatives"], rows)),
     };
 
     page.section("Free runs from the commands");
@@ -90,21 +90,24 @@ pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Pag
         drawn(&mut page, &problem.joints[answer.joint].name, answer);
     }
 
-    page.section("What these recordings do not tell apart");
+    page.section("Details");
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
         .flat_map(|j| j.shared.iter().map(|s| vec![j.joint.clone(), sentence(&s.sentence), sentence(&s.separated_by)]))
         .collect();
-    page.table(table(["joint", "what is shared", "what tells them apart"], rows));
+    page.details("What these recordings do not separate", |inside| {
+        inside.table(table(["joint", "not separated", "what separates them"], rows));
+    });
 
-    page.section("Numbers");
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
         .flat_map(|j| j.numbers.iter().map(|(key, e)| vec![j.joint.clone(), key.replace('_', " "), estimate(e)]))
         .collect();
-    page.table(table(["joint", "number", "value and 95 % interval"], rows));
+    page.details("Parameters", |inside| {
+        inside.table(table(["joint", "parameter", "value and 95 % interval"], rows));
+    });
     ending(&mut page, &TERMS);
     page
 }
@@ -141,7 +144,7 @@ fn drawn(page: &mut Page, joint: &str, answer: &Answer) {
             .series(line("second order", &error(&judged.refit), Colour::Nth(0), Dash::Dashed))
             .series(line("diagnosed", &error(&judged.diagnosed), Colour::Nth(1), Dash::Solid));
         let (share, mae) = scored(&judged.diagnosed, &record.position);
-        let how = if answer.is_held_out { "no fit has seen it" } else { "simulated by a fit without it" };
+        let how = if answer.is_held_out { "held out" } else { "simulated with a fit to the other recordings" };
         page.figure(
             Figure::stacked([upper, lower]),
             &format!("{joint} in {}: {how}; nrmse {share:.3}, mean error {} mrad.", file_name(&record.name), number(1e3 * mae)),

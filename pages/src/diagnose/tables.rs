@@ -31,7 +31,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         search.found.len(),
         search.simulations
     ));
-    let mut fitted = Table::new(["structure fitted", "parameters", "residual, in noise sd", "behind the chosen one", ""]);
+    let mut fitted = Table::new(["structure fitted", "parameters", "residual, in noise sd", "worse than the chosen one", ""]);
     let level = |c: &Candidate| c.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let mut push = |c: &Candidate| {
         let behind = -advantage_over(best, c, search.samples);
@@ -42,7 +42,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
                 ("as good, more parameters".to_string(), Tone::Unsure)
             }
             () if behind.abs() <= ALIKE => ("as good".to_string(), Tone::Unsure),
-            () if behind < 0.0 => ("better, not by enough".to_string(), Tone::Unsure),
+            () if behind < 0.0 => ("better, not significantly".to_string(), Tone::Unsure),
             () => ("explains less".to_string(), Tone::Neutral),
         };
         let behind = if c.structure.name() == best.structure.name() { "–".to_string() } else { number(behind) };
@@ -56,24 +56,25 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     };
     push(&search.nominal);
     search.found.iter().take(SHOWN).for_each(&mut push);
-    page.table(fitted.caption(
-        "Residual: root mean square of the worst output. Behind: difference of the information criterion, each parameter paid for.",
-    ));
+    page.table(
+        fitted
+            .caption("Residual: rms of the worst output. Worse: difference of the information criterion, which penalises each parameter."),
+    );
 
     let mut all: Vec<_> = search.tried.iter().collect();
     all.sort_by(|a, b| b.taken.unwrap_or(-1.0).total_cmp(&a.taken.unwrap_or(-1.0)).then(b.promised.total_cmp(&a.promised)));
     let least = all.iter().filter(|t| t.taken.is_some()).map(|t| t.promised).fold(f64::INFINITY, f64::min);
     let table = |part: &[&backdrive_diagnosis::search::Tried]| {
-        let mut table = Table::new(["physics", "place", "promised by screening", "taken by the fit", "why not"]);
+        let mut table = Table::new(["physics", "place", "promised by screening", "achieved by the fit", "why not"]);
         for tried in part {
             let (physics, place) = tried.id.split_once('@').unwrap_or((&tried.id, ""));
             let is_chosen = best.structure.added.iter().any(|h| h.id == tried.id);
             let why = match tried.taken {
                 _ if is_chosen => Cell::tone("part of what is claimed", Tone::Good),
-                Some(taken) if taken < 0.01 => Cell::from("alone it explains nothing once the parameters are free"),
+                Some(taken) if taken < 0.01 => Cell::from("explains nothing once the parameters are free"),
                 Some(_) => Cell::from("others explain more"),
-                None if tried.promised < least => Cell::from("promised less than all that were fitted"),
-                None => Cell::from("others like it promised more, or ended the search"),
+                None if tried.promised < least => Cell::from("promised less than those fitted"),
+                None => Cell::from("similar ones promised more, or the search ended"),
             };
             let taken = tried.taken.map_or("not fitted".to_string(), percent);
             table.push([
@@ -142,16 +143,15 @@ pub(super) fn numbers(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         }
         table.push(cells);
     }
-    page.table(
-        table.caption(
-            "Missing physics hides in parameters: what moves far when refitted alone, and back once the physics is there, hid it.",
-        ),
-    );
+    page.table(table.caption(
+        "A missing effect distorts parameters: one that changes much in the refit, and returns once the effect is added, had absorbed \
+                it.",
+    ));
     let (which, spread) = if added { (best, &after_spread) } else { (nominal, &before_spread) };
     let pairs = correlated(problem, which, spread, CORRELATED);
     if !pairs.is_empty() {
         let text: Vec<String> = pairs.iter().take(8).map(|p| format!("{} with {} ({:.2})", p.first, p.second, p.correlation)).collect();
-        page.note(&format!("The recordings tell these apart badly: {}.", text.join("; ")));
+        page.note(&format!("The recordings hardly separate these parameters: {}.", text.join("; ")));
     }
 }
 
@@ -163,7 +163,7 @@ pub(super) fn per_record(page: &mut Page, found: &Diagnosis) {
     }
     let mut header = vec!["parameter".to_string()];
     header.extend(fits.records.iter().map(|r| crate::parts::file_name(r).to_string()));
-    header.push("chance of this much scatter".to_string());
+    header.push("probability of this scatter".to_string());
     let mut table = Table::new(header);
     for across in &fits.numbers {
         let disagree = fits.disagreements().iter().any(|d| d.name == across.name);
@@ -186,7 +186,7 @@ pub(super) fn per_record(page: &mut Page, found: &Diagnosis) {
         table.push(cells);
     }
     page.table(table.caption(
-        "With half the width of the 95 % intervals. A device has one set of parameters: where records disagree, the structure is wrong.",
+        "± half the width of the 95 % interval. A device has one set of parameters: if records disagree, the model structure is wrong.",
     ));
 }
 
@@ -205,7 +205,7 @@ pub(super) fn audit(page: &mut Page, found: &Diagnosis) {
         }
     }
     page.table(files);
-    let mut table = Table::new(["looked at", "where", "seen", "weight"]);
+    let mut table = Table::new(["checked", "where", "seen", "weight"]);
     for remark in &found.remarks {
         let (word, tone) = match remark.weight {
             Weight::Note => ("note", Tone::Neutral),

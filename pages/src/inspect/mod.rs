@@ -21,16 +21,16 @@ const WINDOW_S: f64 = 8.0;
 
 /// The page.
 pub fn page(report: &Report, recordings: &[Recording]) -> Page {
-    let mut page = Page::new("Is the recording right?");
+    let mut page = Page::new("Checks of the recording");
     let wrong = report.wrong().count();
-    page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
+    page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &lead(report));
     if !report.findings.is_empty() {
-        page.section("What was found");
         let items: Vec<(String, Option<String>)> =
             report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
         if !items.is_empty() {
             lines_to_paste(&mut page, &items);
         }
+        page.section("Findings");
         let mut table = Table::new(["", "recording", "joint", "finding", "sure", "what to do"]);
         for finding in &report.findings {
             let (word, tone) = if finding.weight == Weight::Wrong { ("wrong", Tone::Bad) } else { ("note", Tone::Neutral) };
@@ -45,6 +45,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         }
         page.table(table);
     }
+    pictures(&mut page, report, recordings);
     if !report.responses.is_empty() {
         page.section("Command and response");
         let mut table = Table::new(std::iter::once("recording").chain(response::HEADERS));
@@ -56,10 +57,9 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         if !drawn.is_empty() {
             page.figure(Figure::beside(drawn), "Command and position where the command moves most.");
         }
-        page.text("A dash stands where the motion does not show it. Droop, dead band and limit of speed are in the position's SI unit.");
+        page.text("A dash: not identifiable from this motion. Droop, dead band and speed limit are in the position's SI unit.");
     }
-    pictures(&mut page, report, recordings);
-    page.section("Signals");
+    page.section("Details");
     page.details("What each column is", |inside| {
         let mut table = Table::new(["recording", "signal", "is", "unit", "sure", "why", "from", "to", "step", "noise"]);
         for signal in &report.signals {
@@ -118,6 +118,12 @@ fn followed(answer: &Response, recordings: &[Recording]) -> Option<Figure> {
     Some(Figure::from(plot.line("command", &t, u).line("position", &t, y)))
 }
 
+/// The answer, with the first problem and how many more there are.
+fn lead(report: &Report) -> String {
+    let Some(first) = report.wrong().next() else { return format!("{}.", report.sentence()) };
+    format!("{}. First: {}.", report.sentence(), first.message)
+}
+
 fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
     let mut shown: Vec<(FindingKind, &str)> = Vec::new();
     let mut drawn = Vec::new();
@@ -134,7 +140,7 @@ fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
         }
     }
     if !drawn.is_empty() {
-        page.section("What shows it");
+        page.section("Evidence");
     }
     for (figure, caption) in drawn {
         page.figure(figure, &caption);
@@ -198,14 +204,11 @@ fn busiest(recording: &Recording, signal: &Signal) -> (f64, f64) {
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 7] = [
-    (
-        "lag",
-        "by how much a position is late behind its command in this motion; a response that is no pure delay has another lag at another speed",
-    ),
-    ("-3 dB", "the frequency at which the response falls to 71 % of its size at low frequencies; >= where the motion goes no further"),
-    ("droop", "steady error while the command is held: what weight and friction bend the servo by"),
-    ("dead band", "steady position approached from above minus from below"),
+    ("lag", "the time by which a position lags its command in this motion; if the response is not a pure delay, the lag depends on speed"),
+    ("-3 dB", "the frequency at which the response falls to 71 % of its low-frequency value; >= if the motion has no higher frequencies"),
+    ("droop", "steady error while the command is constant, due to weight and friction"),
+    ("dead band", "steady position after an approach from above minus that from below"),
     ("rectified", "logged without its sign"),
     ("jitter", "standard deviation of the steps of the clock"),
-    ("sure", "probability that the finding is so"),
+    ("sure", "probability that the finding is right"),
 ];

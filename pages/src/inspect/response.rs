@@ -5,7 +5,7 @@ use backdrive_report::number;
 
 /// Headers of the table of joints.
 pub const HEADERS: [&str; 8] =
-    ["joint", "lag, ms (95 %)", "-3 dB, Hz", "overshoot", "droop, mean (largest)", "dead band", "limit of speed", "clock, Hz (jitter, ms)"];
+    ["joint", "lag, ms (95 %)", "-3 dB, Hz", "overshoot", "droop, mean (largest)", "dead band", "speed limit", "clock, Hz (jitter, ms)"];
 
 /// One line of that table.
 pub fn cells(response: &Response) -> Vec<String> {

@@ -6,8 +6,8 @@ use backdrive_stability::nyquist::{CoupledLoops, Limit};
 use backdrive_stability::verdict::Answer;
 
 /// What to make of loops that are nothing by the models.
-pub const CANCELLED: &str = "By the models next to nothing comes back round the loops: the canceller has the very model that the master has. \
-     That they are stable at any gain says nothing of a device that its model is not quite.";
+pub const CANCELLED: &str = "By the models the loops have almost no feedback, because the canceller has exactly the master's model. This \
+     does not show that a real device, which differs from its model, is stable.";
 
 /// Eigenloci and limits; a sentence where the models do not tell; nothing of one axis.
 pub(super) fn axes(page: &mut Page, found: &Answer) {
@@ -15,27 +15,26 @@ pub(super) fn axes(page: &mut Page, found: &Answer) {
         None => return,
         Some(Err(why)) => {
             page.section("Axes together, by the models");
-            page.text(&format!("Their loops together are not told from the models: {why}."));
+            page.text(&format!("Their joint stability does not follow from the models: {why}."));
             return;
         }
         Some(Ok(loops)) => loops,
     };
     page.section("Axes together, by the models");
     page.text(&match loops.encirclements {
-        0 => {
-            "At the gain asked the eigenloci do not encircle +1: the axes together are stable (generalised Nyquist criterion).".to_string()
-        }
-        n => format!("At the gain asked the eigenloci encircle +1: {n} unstable poles (generalised Nyquist criterion)."),
+        0 => "At the requested gain the eigenloci do not encircle +1: the axes together are stable (generalised Nyquist criterion)."
+            .to_string(),
+        n => format!("At the requested gain the eigenloci encircle +1: {n} unstable poles (generalised Nyquist criterion)."),
     });
     if loops.is_cancelled() {
         page.note(CANCELLED);
     }
     page.figure(
         loci(loops, found.gain.product()),
-        "Eigenvalues of the matrix of the loops at the gain asked, from the models about the contact that was recorded, without dry friction, \
-         whose loss makes a loop more stable. Our sign: a force comes back with its sign, so +1 stands where textbooks have -1.",
+        "Eigenvalues of the loop matrix at the requested gain, from the models linearised at the recorded contact, without dry friction \
+         (which adds stability). The feedback is positive, so the critical point is +1 instead of the usual -1.",
     );
-    let mut table = Table::new(["loops closed", "stable up to μλ", "edge at"]);
+    let mut table = Table::new(["loops closed", "stable up to μλ", "limit at"]);
     let mut row = |name: &str, limit: &Limit| {
         let gain = limit.critical_gain.map_or("any gain".to_string(), number);
         let hz = limit.frequency_hz.filter(|hz| *hz > 0.0).map_or("–".to_string(), |hz| si(hz, "Hz"));
@@ -45,7 +44,7 @@ pub(super) fn axes(page: &mut Page, found: &Answer) {
     loops.alone.iter().for_each(|(axis, limit)| row(&format!("{axis} alone, the others open"), limit));
     page.table(table);
     if loops.alone_misleads() {
-        page.note("The axes act on each other round the loop: what each allows alone is no answer for all of them.");
+        page.note("The axes interact through the loop: their separate limits are no answer for all axes together.");
     }
 }
 

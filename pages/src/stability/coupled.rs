@@ -16,7 +16,7 @@ pub(super) fn coupled(page: &mut Page, found: &Answer) {
         let Some(coupling) = &axis.coupling else {
             page.text(&format!(
                 "{name}The law of the motors is not known: {}.",
-                axis.why_not.as_deref().unwrap_or("it was not looked for")
+                axis.why_not.as_deref().unwrap_or("it was not identified")
             ));
             continue;
         };
@@ -30,19 +30,19 @@ pub(super) fn coupled(page: &mut Page, found: &Answer) {
                 table.push(row(motor, what, &estimate));
             }
         }
-        page.table(table.caption("SI units; times in s. Positions and speeds are how far and how much faster the other side is."));
-        let mut rivals = Table::new(["motor", "law", "unexplained in unseen time"]);
+        page.table(table.caption("SI units; times in s. Positions and speeds are those of the other side relative to this side."));
+        let mut rivals = Table::new(["motor", "law", "unexplained in held-out time"]);
         for (motor, side) in [("master", &coupling.master), ("slave", &coupling.slave)] {
             let own = side.gains.iter().map(|g| g.term.name()).collect::<Vec<_>>().join(", ");
-            rivals.push([Cell::from(motor), format!("{own} (told)").into(), format!("{:.1e}", side.unexplained).into()]);
+            rivals.push([Cell::from(motor), format!("{own} (recorded)").into(), format!("{:.1e}", side.unexplained).into()]);
             for rival in &side.rivals {
                 let terms = rival.terms.iter().map(|t| t.name()).collect::<Vec<_>>().join(", ");
                 rivals.push([Cell::from(motor), terms.into(), format!("{:.1e}", rival.unexplained).into()]);
             }
         }
-        page.table(rivals.caption(
-            "Other laws that were fitted, by the share of the force's variance that they leave in time that the fit has not seen.",
-        ));
+        page.table(
+            rivals.caption("Other fitted laws, with the share of the force's variance that they leave unexplained in held-out time."),
+        );
         decay(page, axis);
     }
 }
@@ -50,7 +50,7 @@ pub(super) fn coupled(page: &mut Page, found: &Answer) {
 fn decay(page: &mut Page, axis: &CoupledAxis) {
     let Some(mode) = &axis.slowest_mode else { return };
     let what = if mode.of_error { "the difference of the positions" } else { "the master's motion" };
-    let mut table = Table::new(["slowest oscillation in", "frequency", "dies by, 1/s", "95 % interval"]);
+    let mut table = Table::new(["least damped oscillation in", "frequency", "decay rate, 1/s", "95 % interval"]);
     let [low, high] = mode.ci95.map(number);
     table.push([Cell::from(what), si(mode.frequency_hz, "Hz").into(), number(mode.per_s).into(), format!("{low} to {high}").into()]);
     page.table(table);

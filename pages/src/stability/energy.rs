@@ -8,13 +8,14 @@ use backdrive_stability::transparency::Transparency;
 pub(super) fn energy(page: &mut Page, answer: &EnergyAnswer, what: &str) {
     page.text(&capital(&answer.reason));
     for axis in &answer.axes {
-        let mut ports = Plot::new(&format!("{}: energy taken by the ports, {what}", axis.name)).x_axis("time", "s").y_axis("energy", "J");
+        let mut ports =
+            Plot::new(&format!("{}: energy received by the ports, {what}", axis.name)).x_axis("time", "s").y_axis("energy", "J");
         ports = ports.line("displayed environment, at the master", &axis.time_s, &axis.master.energy_j);
         ports = ports.line("environment, at the slave", &axis.time_s, &axis.slave.energy_j);
         ports = ports.line("channel between them", &axis.time_s, &axis.two_port.energy_j);
         let mut plots = vec![ports.include_y(0.0)];
         if !axis.elements.is_empty() {
-            let mut taken = Plot::new("").y_axis("energy taken in the master, by its model", "J").include_y(0.0);
+            let mut taken = Plot::new("").y_axis("energy dissipated in the master, by its model", "J").include_y(0.0);
             for e in &axis.elements {
                 taken = taken.line(&format!("{} ({})", e.name, e.kind), &axis.time_s, &e.energy_j);
             }
@@ -22,7 +23,7 @@ pub(super) fn energy(page: &mut Page, answer: &EnergyAnswer, what: &str) {
         }
         page.figure(
             Figure::stacked(plots),
-            "A port below zero has given more than it took. Passive is enough for stable, and not needed for it.",
+            "A port below zero has delivered more energy than it received. Passivity is sufficient for stability, but not necessary.",
         );
         energy_numbers(page, axis);
     }
@@ -49,12 +50,12 @@ fn energy_numbers(page: &mut Page, axis: &AxisEnergy) {
     }
     page.table(table);
     if let Some(why) = &axis.elements_reason {
-        page.note(&format!("What friction and hysteresis took cannot be told: {why}"));
+        page.note(&format!("The energy dissipated by friction and hysteresis is not known: {why}"));
     }
     match (&axis.bounds, &axis.bounds_reason) {
         (Some(b), _) => {
             let within = |yes: bool| if yes { Cell::tone("within", Tone::Good) } else { Cell::tone("beyond", Tone::Warning) };
-            let mut table = Table::new(["bound", "displayed stiffness at most", "μλ at most", "at this gain"]);
+            let mut table = Table::new(["bound", "largest displayed stiffness", "largest μλ", "at this gain"]);
             table.push([
                 Cell::from("Colgate: viscous damping and delay"),
                 si(b.colgate_n_per_m, "N/m").into(),
@@ -78,7 +79,7 @@ fn energy_numbers(page: &mut Page, axis: &AxisEnergy) {
             }
         }
         (None, Some(why)) => {
-            page.note(&format!("The classical bounds cannot be told: {why}"));
+            page.note(&format!("The classical bounds are not known: {why}"));
         }
         (None, None) => {}
     }
@@ -109,9 +110,7 @@ pub(super) fn transparency(page: &mut Page, axes: &[Transparency]) {
         ]);
     }
     page.table(
-        table.caption(
-            "Root mean squares; induced motion as a share of what the hand does; the impedance error is a mean factor, 1 is ideal.",
-        ),
+        table.caption("Rms values; induced motion as a share of the hand's motion; the impedance error is a mean factor, 1 is ideal."),
     );
     for t in axes {
         if let Some(i) = &t.impedance {
@@ -122,7 +121,7 @@ pub(super) fn transparency(page: &mut Page, axes: &[Transparency]) {
             page.figure(
                 Figure::stacked([magnitude.line("environment μλZ_e", &i.frequency_hz, &i.environment), phase]),
                 &format!(
-                    "Against the {}, where the coherence is at least {}; ideal: the curves lie on each other.",
+                    "Estimated with the {}, where the coherence is at least {}. Ideally the curves coincide.",
                     i.against,
                     number(i.least_coherence)
                 ),

@@ -23,7 +23,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
     };
     let measured = found.frequency.as_ref().filter(|f| f.cannot_tell.is_none());
     if swept.is_empty() && measured.is_none() {
-        page.text("Neither could the loop be run again nor does the recording tell it: there is nothing to draw over the gain.");
+        page.text("The loop could neither be re-simulated nor identified from the recording, so there is no figure over the gain.");
         return;
     }
     let asked = found.gain.product();
@@ -50,7 +50,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
             if answer.margins.and_then(|m| m.critical).is_some_and(|c| c.factor < 1.0) { -distance } else { distance }
         };
         let distance: Vec<f64> = gains.iter().map(signed).collect();
-        let mut plot = Plot::new("").y_axis("distance of L from +1, measured (below 0: beyond the edge)", "").include_y(0.0);
+        let mut plot = Plot::new("").y_axis("distance of L from +1, measured (below 0: above the stability limit)", "").include_y(0.0);
         plot = plot.y_limits(-1.0, 1.0).line("", &gains, &distance);
         plots.push(plot);
     }
@@ -74,14 +74,14 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         *plot = if count == 1 && !bare { drawn.height(260.0) } else { drawn };
     }
     let what = match (curve.is_empty(), again) {
-        (false, _) => format!("{} gains, the loop run again at each with the grip as recorded; the colour is its verdict.", swept.len()),
+        (false, _) => format!("Re-simulation at {} gains with the grip as recorded; the colour is the verdict.", swept.len()),
         (true, Some(again)) => format!(
-            "The colour is the verdict of the loop run again with the grip as recorded, at the {} gains at which the edge was looked for (--sweep draws more); it was \
-             narrowed down with {} runs.",
+            "The colour is the verdict of the re-simulation with the grip as recorded, at the {} gains of the search for the stability \
+             limit (--sweep adds more). The limit was refined with {} runs.",
             swept.len(),
             again.edge.evaluations
         ),
-        (true, None) => "By the measured frequency response alone.".to_string(),
+        (true, None) => "From the measured frequency response alone.".to_string(),
     };
     page.figure(Figure::stacked(plots), &what);
     if let Some(again) = again {
@@ -91,7 +91,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
 
 /// What is marked on the gain axis.
 fn edge_marks(found: &Answer) -> Vec<(f64, String, Tone)> {
-    let mut marks = vec![(found.gain.product(), format!("asked {}", number(found.gain.product())), tone(found.verdict))];
+    let mut marks = vec![(found.gain.product(), format!("requested {}", number(found.gain.product())), tone(found.verdict))];
     if let Some([low, high]) = found.recorded_gain.filter(|r| r.iter().all(|g| *g > 0.0)) {
         marks.push((low, format!("recorded {}", number(low)), Tone::Neutral));
         if high > low * 1.001 {
@@ -99,16 +99,16 @@ fn edge_marks(found: &Answer) -> Vec<(f64, String, Tone)> {
         }
     }
     if let Some(edge) = found.resimulated.as_ref().and_then(|a| a.edge.critical_gain) {
-        marks.push((edge, format!("edge, re-simulated {}", number(edge)), Tone::Bad));
+        marks.push((edge, format!("limit, re-simulated {}", number(edge)), Tone::Bad));
     }
     // Below those of the recorded grip there may be one of a firmer or softer one.
     let marked = |edge: f64, marks: &[(f64, String, Tone)]| marks.iter().any(|m| m.2 == Tone::Bad && (m.0 / edge - 1.0).abs() < 0.005);
     let limit = found.critical_gain.or(found.at_least.filter(|least| *least < found.gain.product()));
     if let Some(edge) = limit.filter(|edge| !marked(*edge, &marks)) {
-        marks.push((edge, format!("to act on {}", number(edge)), Tone::Bad));
+        marks.push((edge, format!("limit to use {}", number(edge)), Tone::Bad));
     }
     if let Some(edge) = found.frequency_answer.as_ref().and_then(|a| a.critical_gain) {
-        marks.push((edge, format!("edge, measured {}", number(edge)), Tone::Bad));
+        marks.push((edge, format!("limit, measured {}", number(edge)), Tone::Bad));
     }
     marks
 }
@@ -139,8 +139,10 @@ fn spaced(from: f64, to: f64) -> Vec<f64> {
 fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
     if !again.grips.is_empty() {
         let head = ["grip".to_string(), "critical μλ".to_string(), format!("at μλ = {}", number(asked))];
-        let mut table =
-            Table::new(head).caption("The edge for softer and firmer grips than the one recorded: nobody knows a grip exactly.");
+        let mut table = Table::new(head).caption(
+            "The stability limit for softer and stiffer grips than the recorded one: a grip is never known \
+                exactly.",
+        );
         let mut rows: Vec<(f64, &Edge, Option<Outcome>)> = again.grips.iter().map(|g| (g.scale, &g.edge, g.at_asked)).collect();
         rows.push((1.0, &again.edge, Some(again.outcome)));
         rows.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -159,8 +161,8 @@ fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
         page.table(table);
     }
     if let Some(over) = again.over_cancelling.as_ref().filter(|o| !o.balances.is_empty()) {
-        page.details("The canceller at rest: does it take out more than the master moves?", |inside| {
-            let mut table = Table::new(["axis", "grip", "amplitude", "master |G(0)|", "canceller |Ĝ(0)|", "runs away beyond μλ"]);
+        page.details("The canceller at rest: does it subtract more than the induced motion?", |inside| {
+            let mut table = Table::new(["axis", "grip", "amplitude", "master |G(0)|", "canceller |Ĝ(0)|", "diverges above μλ"]);
             for b in &over.balances {
                 let limit = b.dc_limit.map_or(Cell::from("never"), |l| Cell::tone(number(l), Tone::Bad));
                 let row = [b.axis.clone(), format!("× {}", b.scale), si(b.amplitude, "m"), si(b.master, "m/N"), si(b.model, "m/N")];

@@ -24,7 +24,7 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         return;
     };
     if let Some(cannot) = &frequency.cannot_tell {
-        page.note(&format!("The loop cannot be told from this recording: {}.", cannot.reason.trim_end_matches('.')));
+        page.note(&format!("The loop cannot be identified from this recording: {}.", cannot.reason.trim_end_matches('.')));
     }
     let gain = found.gain.product();
     let axes = frequency.levels.iter().flat_map(|l| l.axes.iter().map(|a| a.name.as_str()));
@@ -36,9 +36,10 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     }
     if let Some(m) = &found.margins {
         let whose = if found.margins_are_of_the_edge() {
-            "At the gain asked, by the measured response of the worst loop at the worst amplitude."
+            "At the requested gain, from the measured response of the least stable loop at the worst amplitude."
         } else {
-            "At the gain asked, by the measured response alone: another edge, lower or known better, is the one to act on (above), and these margins are not to it."
+            "At the requested gain, from the measured response alone. The stability limit to use (above) is lower or known better; these \
+                margins do not refer to it."
         };
         let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{} {unit}", number(v)));
         page.table(
@@ -51,30 +52,33 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
     if several && frequency.levels.iter().any(|l| !l.loci.is_empty()) {
         page.figure(
             loci(frequency, gain),
-            "All axes together: the loop is stable if none of these loci encircles +1. No discs: see each axis below.",
+            "All axes together: the loop is stable if none of these loci encircles +1. Uncertainty is shown for each axis below.",
         );
     }
     for name in &names {
         let found: Vec<(&LevelEstimate, &AxisEstimate)> =
             frequency.levels.iter().filter_map(|l| Some((l, l.axes.iter().find(|a| a.name == **name)?))).collect();
         if found.iter().all(|(_, a)| !a.told.iter().any(|t| *t)) {
-            page.text(&format!("{name}: no line of the loop stands out of its uncertainty."));
+            page.text(&format!("{name}: no line of the loop exceeds its uncertainty."));
             continue;
         }
         let title = if several { format!("{name}: ") } else { String::new() };
         page.figure(
-            nyquist(&found, gain, &title),
-            "L, once round the loop, scaled to the gain asked, the colour of the curve with the lowest edge is its frequency; the closed loop is F_f = d + L F_f, so +1 is the critical \
-             point. The discs, drawn near +1 only, hold 95 % each. Only lines at which L stands out of its uncertainty are drawn.",
-        );
-        page.figure(
             bode(&found, gain, &title),
-            "The loop is on its edge where |L| = 1 at a phase of 0° (or a whole turn). The band holds 95 %.",
+            "The loop is at its stability limit where |L| = 1 at a phase of 0° (or a multiple of 360°). Band: 95 % interval.",
         );
+        page.details(&format!("{title}Nyquist plot"), |inside| {
+            inside.figure(
+                nyquist(&found, gain, &title),
+                "Open-loop response L at the requested gain. The closed loop is F_f = d + L F_f, so +1 is the critical point. Colour: \
+                 frequency. Discs: 95 % confidence regions near +1. Lines within their uncertainty are omitted.",
+            );
+        });
     }
     page.details("How the response was estimated", |inside| {
         inside.text(&frequency.method);
-        let mut table = Table::new(["dither rms", "rows", "window", "segment", "segments", "averages", "line spacing", "critical μλ", "95 % interval"]);
+        let mut table =
+            Table::new(["dither rms", "rows", "window", "segment", "segments", "averages", "line spacing", "critical μλ", "95 % interval"]);
         for level in &frequency.levels {
             let a = &level.averaging;
             table.push([
@@ -97,12 +101,12 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         let p = &frequency.provenance;
         inside.text(&format!("Master: {}; canceller: {}; slave and environment: {}.", p.master, p.canceller, p.slave));
         if let Some(delay) = frequency.delays.loop_s {
-            inside.text(&format!("Delay of the loop beside its devices: {}.", si(delay, "s")));
+            inside.text(&format!("Delay of the loop outside its devices: {}.", si(delay, "s")));
         }
         let r = &frequency.rows;
         inside.text(&format!(
-            "Of {} rows {} were used; left out: {} missing, {} clamped, {} while a gain ramped, {} out of contact, {} while the hand moved, \
-             {} without excitation, {} while settling.",
+            "Of {} rows {} were used. Omitted: {} missing, {} clamped, {} while a gain ramped, {} out of contact, {} while the hand \
+             moved, {} without excitation, {} while settling.",
             r.all, r.used, r.missing, r.clamped, r.ramping, r.free, r.moving, r.quiet, r.settling
         ));
     });
@@ -121,7 +125,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
     let mut order: Vec<usize> = (0..found.len()).collect();
     order.sort_by_key(|i| first == Some(*i)); // the curve that decides last, on top
     for (i, (level, axis)) in order.into_iter().filter_map(|i| Some((i, found.get(i)?))) {
-        let at = |k: usize| told(axis, k).map_or((f64::NAN, f64::NAN), |l| (gain * l[0], gain * l[1]));
+        let at = |k: usize| at_line(axis, k).map_or((f64::NAN, f64::NAN), |l| (gain * l[0], gain * l[1]));
         let (re, im): (Vec<f64>, Vec<f64>) = (0..axis.l.len()).map(at).unzip();
         seen.extend(re.iter().copied().zip(im.iter().copied()));
         let every = axis.l.len().div_ceil(DISCS).max(1);
@@ -138,7 +142,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(colour));
         let curve = Series::line(&name, &re, &im).colour(colour).dash(Dash::Solid);
         plot = plot.series(if leads { curve.by("frequency", "Hz", &level.hz).width(2.2) } else { curve.width(0.8) });
-        let lines: Vec<usize> = (0..axis.l.len()).filter(|k| told(axis, *k).is_some()).collect();
+        let lines: Vec<usize> = (0..axis.l.len()).filter(|k| at_line(axis, *k).is_some()).collect();
         let mut marks = vec![lines.first().copied(), lines.last().copied()];
         if let Some(hz) = axis.edge.frequency_hz {
             let near = |k: &&usize| level.hz.get(**k).map_or(f64::INFINITY, |f| (f - hz).abs());
@@ -192,7 +196,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
     let (mut lowest, mut highest) = (0.0f64, 0.0f64);
     let first = first_edge(found);
     for (i, (level, axis)) in found.iter().enumerate() {
-        let size = |k: usize| told(axis, k).map_or(f64::NAN, |l| gain * l[0].hypot(l[1]));
+        let size = |k: usize| at_line(axis, k).map_or(f64::NAN, |l| gain * l[0].hypot(l[1]));
         let db = |v: f64| 20.0 * v.log10();
         let n = axis.l.len();
         let spread = |k: usize| INTERVAL_95 * gain * axis.sigma.get(k).copied().unwrap_or(f64::NAN);
@@ -209,7 +213,7 @@ fn bode(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Fi
         phase = phase.series(Series::line("", &level.hz, &angles).colour(Colour::Nth(i)));
         coherence = coherence.series(Series::line("", &level.hz, &axis.coherence).colour(Colour::Nth(i)));
         if let Some(hz) = axis.edge.frequency_hz.filter(|hz| *hz > 0.0 && first == Some(i)) {
-            magnitude = magnitude.vertical(hz, &format!("edge at {}", si(hz, "Hz")), Tone::Bad);
+            magnitude = magnitude.vertical(hz, &format!("limit at {}", si(hz, "Hz")), Tone::Bad);
             phase = phase.vertical(hz, "", Tone::Bad);
         }
     }
@@ -227,7 +231,7 @@ fn first_edge(found: &[(&LevelEstimate, &AxisEstimate)]) -> Option<usize> {
 }
 
 /// L at a line that carries information, per unit gain.
-fn told(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
+fn at_line(axis: &AxisEstimate, line: usize) -> Option<[f64; 2]> {
     let told = axis.told.get(line).copied().unwrap_or(false);
     axis.l.get(line).copied().filter(|l| told && l.iter().all(|v| v.is_finite()))
 }
@@ -237,7 +241,7 @@ fn unwrapped(axis: &AxisEstimate) -> Vec<f64> {
     let mut before: Option<f64> = None;
     (0..axis.l.len())
         .map(|k| {
-            let Some(l) = told(axis, k) else { return f64::NAN };
+            let Some(l) = at_line(axis, k) else { return f64::NAN };
             let angle = l[1].atan2(l[0]).to_degrees();
             let angle = before.map_or(angle, |b| angle + 360.0 * ((b - angle) / 360.0).round());
             before = Some(angle);

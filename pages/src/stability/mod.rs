@@ -31,8 +31,8 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
         false => format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())),
     });
     page.lead(tone(found.verdict), &lead(found));
-    page.text(&capital(&found.reason));
     todo(&mut page, steps);
+    page.text(&capital(&found.reason));
     for d in &found.disagreements {
         page.warning(&capital(&d.text));
     }
@@ -44,28 +44,25 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
         coupled::coupled(&mut page, found);
         page.section("Response, as recorded");
     } else {
+        page.section("Gain");
+        gains(&mut page, found, curve);
+        page.section("Methods");
         page.table(methods(found));
         page.section("Loop, measured");
         measured(&mut page, found);
         axes::axes(&mut page, found);
-        page.section("Gain");
-        gains(&mut page, found, curve);
         page.section(&format!("Response at μλ = {}", number(found.gain.product())));
     }
     response(&mut page, found, session);
-    page.section("Energy");
-    match &found.resimulated {
-        Some(again) => {
-            energy(&mut page, &again.energy, &format!("run again at μλ = {}", number(found.gain.product())));
-            page.details("Energy as recorded", |inside| energy(inside, &found.recorded_energy, "as recorded"));
-        }
-        None => energy(&mut page, &found.recorded_energy, "as recorded"),
+    page.section("Details");
+    if let Some(again) = &found.resimulated {
+        let at = format!("re-simulated at μλ = {}", number(found.gain.product()));
+        page.details(&format!("Energy, {at}"), |inside| energy(inside, &again.energy, &at));
     }
-    page.section("Transparency, as recorded");
-    transparency(&mut page, &found.transparency);
+    page.details("Energy, as recorded", |inside| energy(inside, &found.recorded_energy, "as recorded"));
+    page.details("Transparency, as recorded", |inside| transparency(inside, &found.transparency));
     if !found.checks.is_empty() || found.loop_check.is_some() {
-        page.section("Models against the recording");
-        models(&mut page, found);
+        page.details("Models against the recording", |inside| models(inside, found));
     }
     ending(&mut page, &TERMS);
     page
@@ -74,18 +71,19 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
 /// The terms of the page.
 const TERMS: [(&str, &str); 10] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
-    ("critical μλ, edge", "the lowest gain at which the loop is not stable; at it the loop oscillates without growing"),
+    ("critical μλ, stability limit", "the lowest gain at which the loop is not stable; there an oscillation neither grows nor decays"),
+    ("L", "the open-loop frequency response: reflected force to master to slave to environment and back; the closed loop is 1/(1 − L)"),
     (
-        "L",
-        "the loop's frequency response, once round: reflected force to master to slave to environment and back; the closed loop is 1/(1 − L)",
+        "margins",
+        "gain, phase or delay that may be added before the loop becomes unstable; modulus margin: the smallest distance of L from \
+        +1",
     ),
-    ("margins", "by how much the gain may rise, the phase or the delay grow, and how near L comes to +1, before the loop is on its edge"),
     ("coherence", "share of a signal's power that the excitation explains, 0 to 1, at each frequency"),
-    ("re-simulation", "the loop of the bag run again from its models with the recorded hand"),
-    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
-    ("limited", "a clamp or the end of the travel decides what happens; never called stable"),
-    ("passive port", "one that never gives more energy than it has taken"),
-    ("95 %", "interval that holds the value in 95 of 100 such recordings"),
+    ("re-simulation", "a simulation of the recorded loop from its models with the recorded hand"),
+    ("limit cycle", "an oscillation of constant amplitude while the hand holds still"),
+    ("limited", "a clamp or the end of travel determines the motion; never called stable"),
+    ("passive port", "one that never delivers more energy than it received"),
+    ("95 %", "range that contains the true value in 95 of 100 such recordings"),
 ];
 
 /// The verdict in a sentence.
@@ -96,8 +94,8 @@ fn lead(found: &Answer) -> String {
             Word::Stable => "Stable",
             Word::LimitCycle => "Not stable: it oscillates in a limit cycle",
             Word::Unstable => "Unstable",
-            Word::Limited => "Limited: a clamp decides, not the loop",
-            Word::CannotTell => "It cannot be told whether the pair is stable",
+            Word::Limited => "Limited: a clamp determines the motion, not the loop",
+            Word::CannotTell => "It is not known whether the pair is stable",
         };
         return format!("{said}, at the gains of the recording.");
     }
@@ -105,26 +103,26 @@ fn lead(found: &Answer) -> String {
         Word::Stable => format!("Stable at μλ = {gain}"),
         Word::LimitCycle => format!("Not stable at μλ = {gain}: it oscillates in a limit cycle"),
         Word::Unstable => format!("Unstable at μλ = {gain}"),
-        Word::Limited => format!("Limited at μλ = {gain}: a clamp or the travel decides, not the loop"),
-        Word::CannotTell => format!("It cannot be told whether the loop is stable at μλ = {gain}"),
+        Word::Limited => format!("Limited at μλ = {gain}: a clamp or the end of travel determines the motion, not the loop"),
+        Word::CannotTell => format!("It is not known whether the loop is stable at μλ = {gain}"),
     };
     let edge = match (found.critical_gain, found.at_least) {
         (Some(edge), _) => {
             let interval = found.critical_gain_ci95.map_or(String::new(), |ci| format!(" (95 %: {})", interval(ci)));
             let how = match found.critical_frequency_hz {
                 Some(hz) if hz > 0.0 => format!(", where it oscillates at {}", si(hz, "Hz")),
-                Some(_) => ", where it runs away without oscillating".to_string(),
+                Some(_) => ", where it diverges without oscillating".to_string(),
                 None => String::new(),
             };
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
-            format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
+            format!(" The stability limit is μλ = {}{interval}{how}{by}.", number(edge))
         }
         // Beyond a clamp or an end of the travel no critical gain can be seen.
         (None, Some(least)) if least < found.gain.product() => {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" It is stable only up to μλ = {}{by}.", number(least))
         }
-        (None, Some(least)) => format!(" No edge up to μλ = {}.", number(least)),
+        (None, Some(least)) => format!(" No stability limit up to μλ = {}.", number(least)),
         (None, None) => String::new(),
     };
     format!("{verdict}.{edge}")
@@ -211,7 +209,7 @@ fn models(page: &mut Page, found: &Answer) {
                 agrees(c.agrees),
             ]);
         }
-        page.table(table.caption("Each device's model run alone on what the device was given in the recording; root mean squares."));
+        page.table(table.caption("Each device's model, simulated alone with the recorded inputs of the device; rms values."));
     }
     if let Some(check) = &found.loop_check {
         let mut table = Table::new(["measured loop against the models' loop", "noise explains", ""]);

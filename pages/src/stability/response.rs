@@ -10,10 +10,10 @@ const IMPACT_S: f64 = 0.3;
 /// Position and force of each axis: run again at the gain asked, else as recorded.
 pub(super) fn response(page: &mut Page, found: &Answer, session: &Session) {
     let (signals, what) = match &found.resimulated {
-        Some(again) => (&again.signals, format!("The loop run again with {}: {}.", again.script, again.outcome)),
+        Some(again) => (&again.signals, format!("Re-simulation with {}: {}.", again.script, again.outcome)),
         None => {
-            let why = found.no_resimulation.as_deref().unwrap_or("it was not asked for");
-            page.note(&format!("The loop was not run again ({why}): below is what was recorded, at its own gain."));
+            let why = found.no_resimulation.as_deref().unwrap_or("it was not requested");
+            page.note(&format!("The loop was not re-simulated ({why}): the recording is shown, at its own gain."));
             (session, "As recorded.".to_string())
         }
     };
@@ -52,7 +52,7 @@ fn time_plots(axis: &AxisSignals, period_s: f64, name: &str, part: Option<(f64, 
     if let Some([low, high]) = axis.travel {
         let seen = |limit: f64| axis.master.iter().any(|x| (x - limit).abs() < 0.2 * (high - low));
         for limit in [low, high].into_iter().filter(|l| l.is_finite() && seen(*l)) {
-            position = position.horizontal(limit, "end of the travel", Tone::Limited);
+            position = position.horizontal(limit, "end of travel", Tone::Limited);
         }
     }
     let mut force = Plot::new("").y_axis("force", "N");

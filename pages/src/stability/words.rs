@@ -68,6 +68,6 @@ mod tests {
         assert_eq!(capital("äh, no"), "Äh, no.");
         assert_eq!(capital("Done."), "Done.");
         assert_eq!(capital(""), "");
-        assert_eq!(capital("the edge lies at mu*lambda = 3"), "The edge lies at μλ = 3.");
+        assert_eq!(capital("the limit is mu*lambda = 3"), "The limit is μλ = 3.");
     }
 }

@@ -60,7 +60,7 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
     for axis in &model.axes {
         let about = format!("axes.{}", axis.name);
         if axis.travel.is_none() {
-            add(Severity::Note, about.clone(), "no travel is given, so no run can tell that the hand left it".into());
+            add(Severity::Note, about.clone(), "no travel is given, so a run cannot detect that the hand left it".into());
         }
         let is_force = model.inputs.get(axis.feedback).is_some_and(|i| i.kind == crate::model::InputKind::Force);
         if is_force && axis.force.is_none() {
@@ -77,7 +77,7 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
         }
         let loose = linear.modes().unwrap_or_default().iter().filter(|m| m.omega_squared == 0.0).count();
         if loose > 0 {
-            let message = format!("{loose} motion(s) that nothing holds: a free device, which a grip or a controller must hold");
+            let message = format!("{loose} motion(s) without restraint: a free device needs a grip or a controller");
             add(Severity::Note, model.name.clone(), message);
         }
     }

@@ -19,7 +19,7 @@ impl AsymmetricCoulomb {
         name: "asymmetric_coulomb",
         equation: "f = c+ for v > 0, -c- for v < 0, set-valued at rest",
         source: "Coulomb",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("positive", "N", Range::NonNegative, "c+"),
             Parameter::number("negative", "N", Range::NonNegative, "c-"),

@@ -19,7 +19,7 @@ impl AsymmetricDamper {
         name: "asymmetric_damper",
         equation: "f = b+ v for v > 0, b- v for v < 0",
         source: "shock absorbers",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("positive", "N s/m", Range::NonNegative, "b+"),
             Parameter::number("negative", "N s/m", Range::NonNegative, "b-"),

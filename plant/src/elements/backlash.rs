@@ -30,7 +30,7 @@ impl Backlash {
         equation: "f = k (x - xb) + c (v - dxb/dt); dxb/dt = v + (k/c)(x - xb) inside |xb| < α, held at ±α while it pushes; \
                    with rounding w, f = k s + c v ds/dx, s = x + (√((x - α)² + w²) - √((x + α)² + w²))/2",
         source: "Nordin, Galic & Gutman 1997",
-        energy: "takes, creates none; pushes only",
+        energy: "dissipates, creates none; pushes only",
         parameters: &[
             Parameter::number("gap", "m", Range::NonNegative, "2α"),
             Parameter::number("stiffness", "N/m", Range::NonNegative, "k"),

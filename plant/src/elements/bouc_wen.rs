@@ -40,7 +40,7 @@ impl BoucWen {
         name: "bouc_wen",
         equation: "f = a k x + (1 - a) k z, dz/dt = A v - β |v| |z|^(n-1) z - γ v |z|^n",
         source: "Bouc 1967, Wen 1976",
-        energy: "takes, creates none while -β <= γ <= β and 0 <= a <= 1",
+        energy: "dissipates, creates none while -β <= γ <= β and 0 <= a <= 1",
         parameters: &[
             Parameter::number("stiffness", "N/m", Range::NonNegative, "k"),
             Parameter::number("ratio", "-", Range::Between(0.0, 1.0), "a"),

@@ -21,7 +21,7 @@ impl Contact {
         name: "contact",
         equation: "f = max(0, k q + b v) where q = x - gap > 0",
         source: "Kelvin-Voigt, one-sided",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("stiffness", "N/m", Range::NonNegative, "k"),
             Parameter::number("damping", "N s/m", Range::NonNegative, "b").or(0.0),

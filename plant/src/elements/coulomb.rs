@@ -17,7 +17,7 @@ impl Coulomb {
         name: "coulomb",
         equation: "f = c sign(v), set-valued at rest",
         source: "Coulomb; as a box-constrained multiplier Moreau 1988, Jean 1999",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[Parameter::number("force", "N", Range::NonNegative, "c")],
         build: |v| Ok(Coulomb { force: v[0][0] }),
     };

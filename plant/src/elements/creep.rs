@@ -31,7 +31,7 @@ impl Creep {
         name: "creep",
         equation: "x = F/k + Σ x_i, τ_i dx_i/dt = F/k_i - x_i",
         source: "Kelvin-Voigt chain; Ferry 1980, as relaxations (generalised Maxwell)",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("stiffness", "N/m", Range::Positive, "k, at once"),
             Parameter::numbers("creep_stiffness", "N/m", Range::Positive, "k_i, of each retarded spring"),
@@ -55,7 +55,7 @@ impl Creep {
         // With z_i = √(k_i τ_i) x_i and b_i = 1/√(k_i τ_i): dz/dt = -(diag(1/τ) + k b bᵀ) z + k b x, F = k (x - b·z).
         let b: Vec<f64> = creep_stiffness.iter().zip(&time).map(|(k, tau)| 1.0 / (k * tau).sqrt()).collect();
         let rates = DMatrix::from_fn(n, n, |i, j| stiffness * b[i] * b[j] + if i == j { 1.0 / time[i] } else { 0.0 });
-        let eigen = SymmetricEigen::try_new(rates, f64::EPSILON, 10_000).ok_or("its numbers are too far apart")?;
+        let eigen = SymmetricEigen::try_new(rates, f64::EPSILON, 10_000).ok_or("its parameters differ by too many orders of magnitude")?;
         let branch = |(rate, vector): (&f64, nalgebra::DVectorView<f64>)| {
             let share: f64 = vector.iter().zip(&b).map(|(v, b)| v * b).sum();
             (stiffness * stiffness * share * share / rate, *rate)

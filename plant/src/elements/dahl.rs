@@ -20,7 +20,7 @@ impl Dahl {
         name: "dahl",
         equation: "dz/dt = v (1 - σ z/c sign v), f = σ z",
         source: "Dahl 1968",
-        energy: "takes, creates none; its memory is local, so a loop inside a loop does not close",
+        energy: "dissipates, creates none; its memory is local, so nested loops do not close",
         parameters: &[Parameter::number("stiffness", "N/m", Range::Positive, "σ"), Parameter::number("coulomb", "N", Range::Positive, "c")],
         build: |v| Ok(Dahl { stiffness: v[0][0], coulomb: v[1][0] }),
     };

@@ -15,7 +15,7 @@ impl Damper {
         name: "damper",
         equation: "f = b v",
         source: "Newton",
-        energy: "takes, creates none while b >= 0",
+        energy: "dissipates, creates none while b >= 0",
         parameters: &[Parameter::number("damping", "N s/m", Range::Any, "b")],
         build: |v| Ok(Damper { damping: v[0][0] }),
     };

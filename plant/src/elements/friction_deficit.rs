@@ -22,7 +22,7 @@ impl FrictionDeficit {
         name: "friction_deficit",
         equation: "f = (c - (c - r) exp(-(v/vs)²)) sign(v), r < c, set-valued at rest",
         source: "the counterpart of stribeck",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("coulomb", "N", Range::NonNegative, "c"),
             Parameter::number("rest", "N", Range::NonNegative, "r, less than c"),

@@ -24,7 +24,7 @@ impl GearLoss {
         name: "gear_loss",
         equation: "f = (1/η - 1) |load| sign(v) driving the joint, (1 - η_b) |load| sign(v) driven by it, set-valued at rest",
         source: "Pelchen, Schweiger & Otter 2002",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("efficiency", "-", Range::Positive, "η, driving the joint, at most 1"),
             Parameter::number("back_efficiency", "-", Range::Any, "η_b, driven by the joint, at most 1; self-locking at 0 and below"),

@@ -26,7 +26,7 @@ impl HuntCrossley {
         name: "hunt_crossley",
         equation: "f = max(0, k qⁿ + λ qⁿ v) where q = x - gap > 0",
         source: "Hunt & Crossley 1975",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("stiffness", "N/m^n", Range::NonNegative, "k"),
             Parameter::number("damping", "N s/m^(n+1)", Range::NonNegative, "λ").or(0.0),

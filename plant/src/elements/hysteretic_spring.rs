@@ -30,7 +30,8 @@ impl HystereticSpring {
         name: "hysteretic_spring",
         equation: "dF/d|x| = γ (line - F), line = f+ + k+ x + k+/γ rising, f- + k- x - k-/γ falling",
         source: "Kuchenbecker & Niemeyer 2005, eqs (2)-(3) in the limit of small steps",
-        energy: "takes while the rising line is above the falling one; creates some on cycles past their crossing x* = (f- - f+)/(k+ - k-)",
+        energy: "dissipates while the rising line is above the falling one; creates some on cycles past their crossing x* = (f- - f+)/(k+ \
+            - k-)",
         parameters: &[
             Parameter::number("stiffness_positive", "N/m", Range::NonNegative, "k+, slope of the rising line"),
             Parameter::number("stiffness_negative", "N/m", Range::NonNegative, "k-, slope of the falling line"),

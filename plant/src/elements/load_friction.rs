@@ -22,7 +22,7 @@ impl LoadFriction {
         name: "load_friction",
         equation: "f = (c + μ |load|) sign(v), set-valued at rest; load: force of the joint",
         source: "Coulomb; of cables and screws Euler 1769, of gears Pelchen, Schweiger & Otter 2002",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("force", "N", Range::NonNegative, "c, without load"),
             Parameter::number("coefficient", "-", Range::NonNegative, "μ, friction per force of the joint"),

@@ -30,7 +30,7 @@ impl Lugre {
         name: "lugre",
         equation: "dz/dt = v - σ0 |v| z/g(v), f = σ0 z + σ1 dz/dt, g = c + (s - c) exp(-(v/vs)²)",
         source: "Canudas de Wit, Olsson, Astrom & Lischinsky 1995, without the viscous term",
-        energy: "may create some on quick reversals unless a damper of at least σ1 (s - c)/c stands beside it (Barabanov & Ortega 2000)",
+        energy: "may create some on quick reversals unless a damper of at least σ1 (s - c)/c acts in parallel (Barabanov & Ortega 2000)",
         parameters: &[
             Parameter::number("stiffness", "N/m", Range::Positive, "σ0"),
             Parameter::number("damping", "N s/m", Range::NonNegative, "σ1"),

@@ -21,7 +21,7 @@ impl MaxwellSlip {
         name: "maxwell_slip",
         equation: "f = Σ k_i z_i, dz_i = dx within |z_i| <= f_i/k_i",
         source: "Iwan 1966; Lampaert, Swevers & Al-Bender 2002; presliding hysteresis with non-local memory",
-        energy: "takes, creates none; loops inside loops close (Masing, wiping out)",
+        energy: "dissipates, creates none; nested loops close (Masing, wiping out)",
         parameters: &[
             Parameter::numbers("stiffness", "N/m", Range::Positive, "k_i, one for each spring"),
             Parameter::numbers("force", "N", Range::NonNegative, "f_i, one for each slider"),

@@ -48,7 +48,8 @@ impl PreisachLugre {
         name: "preisach_lugre",
         equation: "f = σ0 h(z) + σ1 dz/dt, dz/dt = v - h(z)/g(v) |v|, h = f_p(z)/σ0 to break-away, f_p a Preisach operator",
         source: "Choi, Han & Kim 2006, eqs (4)-(13); gate: Dupont, Hayward, Armstrong & Altpeter 2002",
-        energy: "takes; loops inside loops close. May create some on quick reversals through σ1, as lugre does, and where f_p(break_away) is above static",
+        energy: "dissipates; nested loops close. May create some on quick reversals through σ1, as lugre does, and where f_p(break_away) \
+            is above static",
         parameters: &[
             Parameter::number("stiffness", "N/m", Range::Positive, "σ0, the unit of h = f_p/σ0; the force does not depend on it"),
             Parameter::number("damping", "N s/m", Range::NonNegative, "σ1"),

@@ -17,7 +17,7 @@ impl QuadraticDrag {
         name: "quadratic_drag",
         equation: "f = q v |v|",
         source: "Rayleigh; turbulent flow through an orifice",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[Parameter::number("coefficient", "N s²/m²", Range::NonNegative, "q")],
         build: |v| Ok(QuadraticDrag { coefficient: v[0][0] }),
     };

@@ -22,7 +22,7 @@ impl Stribeck {
         name: "stribeck",
         equation: "f = (c + (s - c) exp(-(v/vs)²)) sign(v), set-valued at rest",
         source: "Stribeck 1902; Gaussian form of Armstrong-Helouvry 1991",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("coulomb", "N", Range::NonNegative, "c"),
             Parameter::number("static", "N", Range::NonNegative, "s, at least c"),

@@ -24,7 +24,7 @@ impl WarmFriction {
         name: "warm_friction",
         equation: "f = c sign(v)/(1 + w), set-valued at rest; dw/dt = |f v|/Q - w/τ",
         source: "first-order lubricant heating, as in thermal friction models of robot joints (Simoni, Beschi, Legnani & Visioli 2015)",
-        energy: "takes, creates none",
+        energy: "dissipates, creates none",
         parameters: &[
             Parameter::number("force", "N", Range::NonNegative, "c, cold"),
             Parameter::number("half_heat", "J", Range::Positive, "Q, heat that halves it"),

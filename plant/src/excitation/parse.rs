@@ -222,7 +222,7 @@ impl FromStr for Excitation {
             let (key, value) = pair.split_once('=').ok_or_else(|| wrong(format!("expected key=value, found \"{pair}\"")))?;
             let (key, value) = (key.trim(), value.trim());
             if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-                return Err(wrong(format!("\"{key}\" is no key")));
+                return Err(wrong(format!("\"{key}\" is not a key")));
             }
             toml.push_str(&format!("{key} = {}\n", value_text(value)));
         }

@@ -42,7 +42,7 @@ pub(super) fn read_fragment_file(
 pub(super) fn only_fragment(mut top: Table, folder: Option<&Path>) -> Result<Fragment, FileError> {
     let (model, motion, is_fragment) = read_head(&mut top)?;
     if !is_fragment {
-        let message = "is the model of a device, expected a fragment (a grip or an environment): its file says kind = \"fragment\"";
+        let message = "is the model of a device, expected a fragment (a grip or an environment): its file has kind = \"fragment\"";
         return Err(FileError::whole(top.file_name(), message));
     }
     read_fragment_file(top, model, motion, folder)
@@ -102,16 +102,16 @@ pub(super) fn read_what_acts(
 fn read_names(table: &mut Table, is_fragment: bool, model: &mut Model) -> Result<(), FileError> {
     for name in table.keys() {
         if name == GROUND {
-            return Err(table.error_at(&name, "ground always exists and has no inertia; leave it out"));
+            return Err(table.error_at(&name, "ground always exists and has no inertia; omit it"));
         }
         if is_fragment && name == PORT {
-            return Err(table.error_at(&name, "stands for the body of the device that the fragment is attached to; leave it out"));
+            return Err(table.error_at(&name, "represents the body of the device to which the fragment is attached; omit it"));
         }
         let inertia = table.need_number(&name, Range::NonNegative)?;
         // A joint of a robot is there already: this is its armature.
         match model.bodies.iter().position(|body| body.name == name) {
             Some(point) if model.is_point(point) => {
-                return Err(table.error_at(&name, "is a point of the robot, which has the inertia of its link; leave it out"));
+                return Err(table.error_at(&name, "is a point of the robot, which has the inertia of its link; omit it"));
             }
             Some(joint) => model.bodies[joint].inertia = inertia,
             None => model.bodies.push(Body { name, inertia }),
@@ -156,7 +156,7 @@ fn place(table: &Table, key: &str, name: &str, is_fragment: bool, model: &mut Mo
         return Ok(Some(model.bodies.len() - 1));
     }
     if name == PORT {
-        return Err(table.error_at(key, "only a fragment has a port: its file says kind = \"fragment\""));
+        return Err(table.error_at(key, "only a fragment has a port: its file has kind = \"fragment\""));
     }
     let bodies = model.bodies.iter().map(|b| b.name.as_str()).chain(std::iter::once(GROUND));
     Err(table.error_at(key, tomlfile::unknown("body", name, bodies)))

@@ -198,7 +198,7 @@ impl Model {
 
     /// Whose number a path leads to; the error names in one sentence what there is instead.
     pub fn number_at(&self, path: &str) -> Result<NumberOf, String> {
-        let bad = || format!("\"{path}\" is no path of a number; expected bodies.NAME or (elements|inputs|outputs).NAME.KEY");
+        let bad = || format!("\"{path}\" is not the path of a parameter; expected bodies.NAME or (elements|inputs|outputs).NAME.KEY");
         let (section, rest) = path.split_once('.').ok_or_else(bad)?;
         if section == "bodies" {
             let body = self.bodies.iter().position(|b| b.name == rest);

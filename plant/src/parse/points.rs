@@ -33,7 +33,7 @@ fn read_point(table: &mut Table, name: &str, model: &mut Model) -> Result<(), Fi
     let axis = match table.numbers("axis", Range::Any)?.as_deref() {
         None => None,
         Some(&[x, y, z]) => {
-            Some(unit(Vector3::new(x, y, z)).ok_or_else(|| table.error_at("axis", "is no direction: its three numbers are 0"))?)
+            Some(unit(Vector3::new(x, y, z)).ok_or_else(|| table.error_at("axis", "is not a direction: its three numbers are 0"))?)
         }
         Some(_) => {
             return Err(table.error_at("axis", "expected three numbers: a direction in the frame of the robot's base, of any length"));

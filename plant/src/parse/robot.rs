@@ -71,7 +71,7 @@ pub(super) fn read_robot(table: &mut Table, model: &mut Model, folder: Option<&P
 /// The robot file's text, and what it is called in errors.
 fn text(table: &mut Table, folder: Option<&Path>) -> Result<(String, String), FileError> {
     match (table.string("file")?, table.string("xml")?) {
-        (Some(_), Some(_)) => Err(table.error_at("xml", "says \"file\" and \"xml\"; expected one of them")),
+        (Some(_), Some(_)) => Err(table.error_at("xml", "has both \"file\" and \"xml\"; expected one of them")),
         (None, Some(xml)) => Ok((xml, format!("{} robot.xml", table.file_name()))),
         (None, None) => Err(table.missing("file")),
         (Some(file), None) => {
@@ -99,7 +99,7 @@ pub(super) fn read_joints(top: &mut Table, model: &mut Model, folder: Option<&Pa
     let Some(mut joints) = top.table("joint")? else { return Ok(()) };
     let Some(arm) = &model.arm else {
         return Err(
-            joints.error("only a model with a [robot] has joints; bodies and elements of one axis stand in [bodies] and [[elements]]")
+            joints.error("only a model with a [robot] has joints; bodies and elements of one axis belong in [bodies] and [[elements]]")
         );
     };
     let names: Vec<String> = arm.tree.coordinates().iter().map(|c| c.name.clone()).collect();

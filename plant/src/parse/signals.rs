@@ -65,7 +65,7 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
         refuse_at_a_point(table, &input)?;
     }
     if kind == InputKind::Force && input.offset != 0.0 {
-        let message = "says where the zero of a recorded motion lies; a force that is always there is an element of kind \"bias\"";
+        let message = "states the zero of a recorded motion; a constant force is an element of kind \"bias\"";
         return Err(table.error_at("offset", message));
     }
     if kind == InputKind::Motion {
@@ -82,12 +82,12 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
 /// A point of a robot can be pushed, not moved: it goes where the joints let it go.
 fn refuse_at_a_point(table: &Table, input: &Input) -> Result<(), FileError> {
     if input.kind == InputKind::Motion {
-        let message =
-            "is a point of the robot, whose place the joints tell: prescribe a joint, or a body of its own that a spring ties to the point";
+        let message = "is a point of the robot, whose position follows from the joints: prescribe a joint, or a separate body that a \
+                spring attaches to the point";
         return Err(table.error_at("on", message));
     }
     if input.back_emf != 0.0 {
-        return Err(table.error_at("back_emf", "is what the speed of a motor takes; a point of the robot has no motor, its joints have"));
+        return Err(table.error_at("back_emf", "acts on the speed of a motor; a point of the robot has no motor, its joints have"));
     }
     Ok(())
 }

@@ -23,7 +23,7 @@ impl MeasuredLoop {
             return Err(format!("a cycle needs 8 samples or more of both, not {} and {}", position.len(), force.len()));
         }
         if !position.iter().chain(force).all(|x| x.is_finite()) {
-            return Err("the cycle has samples that are no numbers".to_owned());
+            return Err("the cycle has samples that are not numbers".to_owned());
         }
         let by = |a: &usize, b: &usize| position[*a].total_cmp(&position[*b]);
         let (Some(low), Some(high)) = ((0..position.len()).min_by(by), (0..position.len()).max_by(by)) else {

@@ -33,9 +33,9 @@ pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
 }
 
 /// The error for a table whose first row holds numbers.
-pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers; \
-     write one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ where no column is \
-     the time); a line that begins with # is a comment";
+pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers. \
+     Add one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ if no column is the \
+     time). A line that begins with # is a comment";
 
 /// Whether a table's first row holds numbers, which are no names of columns.
 pub fn is_no_heading<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
@@ -149,7 +149,7 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
         RecordingError::NotRising { index, before, now, .. } => {
             let mut message = format!("time does not rise: {now} s after {before} s");
             if now < before {
-                message.push_str("; of a file with several runs, set.toml takes one with where or rows");
+                message.push_str("; from a file with several runs, set.toml selects one with where or rows");
             }
             FileError::at(&name, lines.get(index).copied().unwrap_or(1), &time.heading, message)
         }
@@ -193,7 +193,7 @@ impl Headings<'_> {
             (None, _) => {
                 let mut message = tomlfile::unknown("column", heading, self.headings.iter());
                 if heading == signal && asked_by.is_empty() {
-                    message.push_str(&format!(" ([columns] {signal} = \"...\" says which column it is)"));
+                    message.push_str(&format!(" ([columns] {signal} = \"...\" names the column)"));
                 }
                 Err(FileError::at(self.name, self.line, asked_by, message))
             }
@@ -206,7 +206,7 @@ impl Headings<'_> {
             None => signal,
             Some(Source::Column(heading)) => heading,
             Some(Source::Topic { topic, .. }) => {
-                let message = format!("[columns] takes \"{signal}\" from the topic {topic}, and a CSV file has columns");
+                let message = format!("[columns] reads \"{signal}\" from the topic {topic}, but a CSV file has columns");
                 return Err(FileError::at(self.name, self.line, "", message));
             }
         };
@@ -222,7 +222,7 @@ impl Headings<'_> {
                         self.name,
                         self.line,
                         &heading,
-                        format!("{message}; or say scale for \"{signal}\" under [columns] of set.toml"),
+                        format!("{message}; or set scale for \"{signal}\" under [columns] of set.toml"),
                     )
                 })?;
                 (unit.map_or(1.0, |u| u.factor), unit)

@@ -106,7 +106,7 @@ pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec
         let torque = match (torque, current, constant) {
             (None, None, None) if is_passive => None,
             (None, _, _) if is_passive => {
-                return Err(below.error_at("torque", "is 0, which says that the joint has no motor; leave current and torque_constant out"));
+                return Err(below.error_at("torque", "is 0, which means that the joint has no motor; omit current and torque_constant"));
             }
             (Some(torque), None, None) => Some(torque),
             (None, Some(current), Some(constant)) if constant != 0.0 => {
@@ -118,10 +118,10 @@ pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec
             (None, Some(_), None) => return Err(below.missing("torque_constant")),
             (Some(_), Some(_), _) => return Err(below.error("has both a torque and a current; keep one")),
             (Some(_), None, Some(_)) => {
-                return Err(below.error_at("torque_constant", "goes with a current, and this joint has a torque; say scale at the torque"));
+                return Err(below.error_at("torque_constant", "is for a current, but this joint has a torque; set scale at the torque"));
             }
             (None, None, Some(_)) => {
-                return Err(below.error_at("torque_constant", "goes with a current, and this joint has none; leave it out"));
+                return Err(below.error_at("torque_constant", "is for a current, and this joint has none; omit it"));
             }
             (None, None, None) if command.is_some() => None,
             (None, None, None) => {

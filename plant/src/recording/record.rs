@@ -105,7 +105,8 @@ pub enum RecordingError {
     },
     /// The file names a unit that the signal cannot have.
     #[error(
-        "{name}: \"{signal}\" is in {unit}, {is}; the model's signal is {expected}: name another column or unit, or say scale under [columns]"
+        "{name}: \"{signal}\" is in {unit}, {is}; the model's signal is {expected}: name another column or unit, or set scale under \
+            [columns]"
     )]
     WrongUnit {
         /// The recording.

@@ -52,7 +52,7 @@ fn finish(mut found: Found, file: &str) -> Result<RobotFile, FileError> {
     Tree::new(&found.robot).map_err(|error| FileError::at(file, line(&error), error.place.clone(), error.message.clone()))?;
     for (link, line) in found.robot.links.iter().zip(&found.link_lines) {
         if let Some(doubt) = link.doubt() {
-            found.remarks.add(format!("link \"{}\"", link.name), *line, format!("{doubt}; it is computed as it stands"), false);
+            found.remarks.add(format!("link \"{}\"", link.name), *line, format!("{doubt}; it is computed unchanged"), false);
         }
     }
     Ok(RobotFile { robot: found.robot, remarks: found.remarks.0 })

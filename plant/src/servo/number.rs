@@ -3,7 +3,7 @@
 /// A number of a servo joint. Forces are those of the joint over the servo's proportional gain, so they are angles (rad).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(usize)]
-#[allow(missing_docs, reason = "FACTS says of each what it is")]
+#[allow(missing_docs, reason = "FACTS describes each")]
 pub enum Number {
     Delay,
     Inertia,

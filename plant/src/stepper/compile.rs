@@ -109,8 +109,8 @@ fn check(model: &Model) -> Result<(), CompileError> {
             && at_a_point
             && linear.inertance != 0.0
         {
-            let message =
-                "an inerter cannot end at a point of the robot; tie it to a joint, or to a body of its own that a spring ties to the point";
+            let message = "an inerter cannot end at a point of the robot; attach it to a joint, or to a separate body that a spring attaches to the \
+                    point";
             return Err(reason(message.to_owned()));
         }
     }

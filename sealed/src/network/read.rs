@@ -34,7 +34,7 @@ impl Network {
         describe(&mut top)?;
         for (name, inertia) in top.named_numbers("bodies", Allowed::NotNegative)? {
             if name == GROUND {
-                return Err(top.error("bodies", "ground is there already; leave it out"));
+                return Err(top.error("bodies", "ground is there already; omit it"));
             }
             network.bodies.push(Body { name: name.to_string(), inertia });
         }
@@ -186,7 +186,7 @@ fn output(section: &mut Section, network: &Network) -> Result<Output, NetworkErr
         "reaction" => {
             let of = body(section, "of", network)?;
             if !network.is_moved(of) {
-                return Err(section.error("of", "no motion input moves this body, so nobody feels its reaction"));
+                return Err(section.error("of", "no motion input moves this body, so it has no reaction"));
             }
             OutputKind::Reaction(of)
         }

@@ -90,7 +90,7 @@ impl<R: BufRead, W: Write> Asker<R, W> {
             self.tell(&format!("{default}> "));
             let mut line = String::new();
             match self.answers.read_line(&mut line) {
-                Ok(0) => return Err(usage(format!("the answers ended; {}", unanswered(question)))),
+                Ok(0) => return Err(usage(format!("no more answers on standard input; {}", unanswered(question)))),
                 Ok(_) => {}
                 Err(e) => return Err(InitError::Machine(format!("standard input: cannot be read: {e}"))),
             }
@@ -114,8 +114,8 @@ impl<R: BufRead, W: Write> Asker<R, W> {
 
 fn unanswered(question: &Question) -> String {
     let choices = if question.choices.is_empty() { String::new() } else { format!(" ({})", question.choices.join(", ")) };
-    let or = question.default.as_ref().map_or(String::new(), |d| format!(", or take the default, {d}, with --yes"));
-    format!("say --{}: {}{choices}{or}", question.option, question.words)
+    let or = question.default.as_ref().map_or(String::new(), |d| format!(", or accept the default, {d}, with --yes"));
+    format!("give --{}: {}{choices}{or}", question.option, question.words)
 }
 
 /// A wrong or missing option.
@@ -154,7 +154,7 @@ mod tests {
         assert!(told.contains("\"3\" is no motion"), "{told}");
         let ended = asked("", true, false, None).0.unwrap_err();
         let InitError::Usage(message) = &ended else { panic!("{ended}") };
-        assert!(message.contains("the answers ended") && message.contains("--motion"), "{message}");
+        assert!(message.contains("no more answers") && message.contains("--motion"), "{message}");
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(asked("", false, false, Some("rotation")).0.unwrap(), "rotation");
         assert_eq!(asked("", false, true, None).0.unwrap(), "translation");
         let missing = asked("", false, false, None).0.unwrap_err();
-        let says = "say --motion: How does it move? (translation, rotation), or take the default, translation, with --yes";
+        let says = "give --motion: How does it move? (translation, rotation), or accept the default, translation, with --yes";
         assert!(matches!(&missing, InitError::Usage(message) if message == says), "{missing}");
         let wrong = asked("", false, false, Some("up")).0.unwrap_err();
         assert!(matches!(&wrong, InitError::Usage(message) if message == "--motion \"up\": \"up\" is no motion"), "{wrong}");

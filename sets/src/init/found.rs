@@ -95,8 +95,8 @@ pub fn recordings(options: &Options) -> Result<Recordings, InitError> {
     let is_bag = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     if paths.iter().any(is_bag) && !paths.iter().all(is_bag) {
         return Err(InitError::input(format!(
-            "{shown}: holds tables and bags, whose columns are named differently; name those of one kind with --recording, or make bags of the \
-             tables with `backdrive bag import`"
+            "{shown}: contains tables and bags, whose columns are named differently; name those of one kind with --recording, or make \
+             bags of the tables with `backdrive bag import`"
         )));
     }
     let (mut all, mut unread): (Vec<Vec<Column>>, Vec<String>) = Default::default();
@@ -124,7 +124,7 @@ pub fn recordings(options: &Options) -> Result<Recordings, InitError> {
         }
     }
     if let (true, true, Some(unread)) = (columns.is_empty(), partial.is_empty(), unread.first()) {
-        return Err(InitError::input(format!("{shown}: the recordings have no numbers that are read: {unread}")));
+        return Err(InitError::input(format!("{shown}: the recordings have no readable numeric columns: {unread}")));
     }
     if columns.is_empty() {
         return Err(InitError::input(format!(

@@ -72,7 +72,7 @@ pub fn make(options: &Options, paths: &[PathBuf]) -> Result<Option<Made>, InitEr
         }
         let place = folder.join(&name);
         if place.exists() && !options.overwrite && !is_of(&place, path) {
-            let what = "exists already and is not of this table; --overwrite replaces it";
+            let what = "exists already and was not made from this table; --overwrite replaces it";
             return Err(InitError::input(format!("{}: {what} ({})", place.display(), path.display())));
         }
         import(options, path, &beside.path().join(&name))?;

@@ -108,16 +108,18 @@ pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Options, fo
         false => refuse(
             "force",
             &options.force,
-            "without a prescribed motion or a load (--attached load) there is no joint that it could be measured in",
+            "without a prescribed motion or a load (--attached load) there is no joint in which it could be measured",
         )?,
     }
     if plan.measured().next().is_none() {
-        return Err(usage("say --position or --velocity: nothing is measured, so there is nothing to hold the model against".to_string()));
+        return Err(usage(
+            "give --position or --velocity: without a measured signal there is nothing to compare the model with".to_string(),
+        ));
     }
     if driven != Driven::Motion {
-        plan.hand = talk.one_of("hand", "Does a hand that nobody measured hold it?", options.hand, Some(false))?;
+        plan.hand = talk.one_of("hand", "Is it held by a hand whose motion was not measured?", options.hand, Some(false))?;
     } else if options.hand == Some(true) {
-        return Err(usage("--hand: a motion that is prescribed leaves a hand nothing to move".to_string()));
+        return Err(usage("--hand: the motion is prescribed, so a hand cannot move it".to_string()));
     }
     Ok(plan)
 }
@@ -128,7 +130,7 @@ fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options) -> Resul
     match is_table || options.time.is_some() {
         true => talk.signal(&Asked {
             option: "time",
-            words: "Which column is the time? (where none is, say with --rate HZ how many rows a second has)",
+            words: "Which column is the time? (if there is none, give the sampling rate with --rate HZ)",
             kinds: &[Kind::Time],
             likely: &TIMES,
             column: &options.time,
@@ -152,7 +154,7 @@ fn drive<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, motion:
     };
     let column =
         Asked { option: "drive", words, kinds, likely, column: &options.drive, unit: &options.drive_unit, si, may_be_absent: false };
-    let mut drive = talk.signal(&column)?.ok_or_else(|| usage("say --drive: which column drives it".to_string()))?;
+    let mut drive = talk.signal(&column)?.ok_or_else(|| usage("give --drive: the column that drives it".to_string()))?;
     if driven == Driven::Current {
         let words =
             motion.pick("The motor's constant, N/A (with the gear's ratio)?", "The motor's constant, N m/A (with the gear's ratio)?");
@@ -180,15 +182,18 @@ fn per_count<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, mot
 fn attached<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, driven: Driven) -> Result<(Attached, f64), InitError> {
     let attached = talk.one_of(
         "attached",
-        "What does the driven body hold on to: nothing (its bearing only), a spring to the frame (a specimen, a return spring), or a load behind a \
-         joint that yields?",
+        "What is attached to the driven body: nothing (its bearing only), a spring to the frame (a specimen, a return spring), or a load \
+         behind a compliant joint?",
         options.attached,
         Some(if driven == Driven::Motion { Attached::Spring } else { Attached::Nothing }),
     )?;
     let resonance = match attached {
-        Attached::Load => {
-            talk.number("resonance", "Roughly where does the load ring against the motor, Hz?", options.resonance, Some(30.0))?
-        }
+        Attached::Load => talk.number(
+            "resonance",
+            "At which frequency does the load resonate against the motor, roughly, Hz?",
+            options.resonance,
+            Some(30.0),
+        )?,
         Attached::Nothing | Attached::Spring => 30.0,
     };
     Ok((attached, resonance))
@@ -211,7 +216,7 @@ fn position_and_velocity<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &
     }
     plan.velocity = talk.signal(&Asked {
         option: "velocity",
-        words: "Which column is its measured velocity? (none, where it was computed from the position: it says nothing new)",
+        words: "Which column is its measured velocity? (none, if it was computed from the position: it contains no new information)",
         kinds: &[plan.motion.pick(Kind::Speed, Kind::AngularSpeed)],
         likely: &VELOCITIES,
         column: &options.velocity,
@@ -306,7 +311,7 @@ impl<R: BufRead, W: Write> Talk<'_, R, W> {
             }
             let column = found.column(text)?;
             if taken.contains(&column) {
-                return Err("has been taken for something else already".to_string());
+                return Err("is used for another signal already".to_string());
             }
             let fits = column.unit.is_none_or(|unit| asked.kinds.contains(&unit.kind));
             let unit = column.unit.map_or(String::new(), |unit| format!("is in {}, {}", unit.name, unit.kind.text()));
@@ -316,7 +321,7 @@ impl<R: BufRead, W: Write> Talk<'_, R, W> {
         let mut assumed = None;
         let unit = match (column.unit, asked.unit) {
             (Some(_), None) => None,
-            (Some(unit), Some(other)) => return Err(usage(format!("--{}-unit {other}: the heading says {}", asked.option, unit.name))),
+            (Some(unit), Some(other)) => return Err(usage(format!("--{}-unit {other}: the heading states {}", asked.option, unit.name))),
             (None, given) => {
                 let option = format!("{}-unit", asked.option);
                 let words = match &column.unknown_unit {

@@ -79,7 +79,7 @@ pub(crate) fn seen<R: BufRead, W: Write>(
     let inertia = asker.ask(&question, options.inertia.map(|x| x.to_string()), |text| match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(Some(x)),
         Err(_) if text == ESTIMATE && estimated.is_some() => Ok(None),
-        _ => Err("expected a number above 0; the recordings do not tell it".to_string()),
+        _ => Err("expected a number above 0; it cannot be estimated from the recordings".to_string()),
     })?;
     let (numbers, from) = match (inertia, estimated) {
         (None, Some(numbers)) => (numbers, "estimated from the recordings by least squares"),
@@ -91,12 +91,15 @@ pub(crate) fn seen<R: BufRead, W: Write>(
             (Numbers { inertia, damping: inertia, stiffness }, "the inertia as given, the rest guessed")
         }
     };
-    let doubt = inertia.zip(estimated).map(|(given, shown)| given / shown.inertia).filter(|f| !(1.0 / DOUBTED..=DOUBTED).contains(f)).map(|factor| {
-        format!(
-            "the inertia as given is {} times what the recordings show by themselves: is it, a unit, the motor's constant or the size of a count wrong?",
-            number(factor)
-        )
-    });
+    let doubt = inertia.zip(estimated).map(|(given, shown)| given / shown.inertia).filter(|f| !(1.0 / DOUBTED..=DOUBTED).contains(f)).map(
+        |factor| {
+            format!(
+                "the given inertia is {} times the estimate from the recordings: is it, a unit, the motor constant or the size of a count \
+                wrong?",
+                number(factor)
+            )
+        },
+    );
     let encoder = plan.position.as_ref().map(|position| {
         let shows = records.iter().find_map(|r| r.signal(&position.name).and_then(step_of));
         options.resolution.or(position.scale.filter(|_| shows.is_some())).or(shows).unwrap_or(0.0)
@@ -158,7 +161,7 @@ fn held_out<R: BufRead, W: Write>(
     if found.names.len() < 2 {
         return match &options.held_out {
             Some(file) => {
-                Err(usage(format!("--held-out {}: is the only recording; what is held out has to be another one", file.display())))
+                Err(usage(format!("--held-out {}: is the only recording; at least one other is needed for the fit", file.display())))
             }
             None => Ok(None),
         };
@@ -170,14 +173,14 @@ fn held_out<R: BufRead, W: Write>(
     let mut order: Vec<(f64, &String)> = records.iter().map(level).zip(&found.names).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let middle = order.get((order.len() - 1) / 2).map(|(_, name)| (*name).clone());
-    let words = "Which recording is held out, so that no fit sees it?";
+    let words = "Which recording is held out, so that no fit uses it?";
     let question = Question { option: "held-out", words, choices: found.names.clone(), default: middle };
     let given = options.held_out.as_ref().map(|path| path.display().to_string());
     let list = found.names.join(", ");
     let chosen = asker.ask(&question, given, |text| {
         let named = Path::new(text).file_name();
         let is = |name: &&String| name.as_str() == text || Path::new(name).file_name() == named;
-        found.names.iter().find(is).cloned().ok_or_else(|| format!("is none of the recordings, {list}"))
+        found.names.iter().find(is).cloned().ok_or_else(|| format!("is not one of the recordings, {list}"))
     })?;
     Ok(Some(chosen))
 }

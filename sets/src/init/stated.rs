@@ -29,13 +29,7 @@ pub fn check(plan: &Plan, records: &[Recording]) -> Result<Option<String>, InitE
         let reach = records.iter().filter_map(|record| reach(record.signal(&signal.name)?)).fold(0.0, f64::max);
         if reach > most {
             let turns = if unit.kind == Kind::Angle { format!(", {} turns", number(reach / TAU)) } else { String::new() };
-            return Err(refused(
-                signal,
-                option,
-                unit.name,
-                &format!("its values reach over {} {}{turns}", number(reach), unit.name),
-                other,
-            ));
+            return Err(refused(signal, option, unit.name, &format!("its values span {} {}{turns}", number(reach), unit.name), other));
         }
     }
     let step = records.iter().map(|record| record.period).fold(0.0, f64::max);
@@ -51,7 +45,7 @@ pub fn check(plan: &Plan, records: &[Recording]) -> Result<Option<String>, InitE
             signal.assumed.as_ref().map(|(option, unit)| format!("{} in {} (--{option})", signal.column.short_name(), unit.name))
         })
         .collect();
-    Ok((!assumed.is_empty()).then(|| format!("units that nothing states are assumed: {}", assumed.join(", "))))
+    Ok((!assumed.is_empty()).then(|| format!("units are assumed where none is stated: {}", assumed.join(", "))))
 }
 
 /// The largest of what a signal spans and how far it is from 0.
@@ -64,8 +58,8 @@ fn reach(samples: &[f64]) -> Option<f64> {
 fn refused(signal: &Signal, option: &str, assumed: &str, but: &str, other: &str) -> InitError {
     let (column, short) = (&signal.column.name, signal.column.short_name());
     usage(format!(
-        "nothing states the unit of {column}, and taken as {assumed} {but}: say --{option} {other} or --{option} {assumed}, or state it in the heading, \
-         as \"{short} [{other}]\""
+        "the unit of {column} is not stated, and assumed as {assumed} {but}: give --{option} {other} or --{option} {assumed}, or state it \
+         in the heading, as \"{short} [{other}]\""
     ))
 }
 

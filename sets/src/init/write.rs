@@ -55,18 +55,18 @@ pub fn model(plan: &Plan, seen: &Seen, name: &str) -> String {
     let has_load = plan.attached == Attached::Load;
     let _ = writeln!(
         out,
-        "# What is believed of the device, written by `backdrive init`: bodies, and what acts between them. SI units.\n\
-         # Every number is a start ({}): `backdrive fit` and `backdrive diagnose` refit all that stand here.",
+        "# The nominal model of the device, written by `backdrive init`: bodies, and what acts between them. SI units.\n# Every number is \
+         a start value ({}): `backdrive fit` and `backdrive diagnose` refit all of them.",
         seen.from
     );
     let _ = writeln!(out, "name   = {}\nmotion = \"{}\"\n\n[bodies]", string(name), plan.motion.pick("translation", "rotation"));
     let share = if has_load { 0.5 * inertia } else { inertia };
     line(&mut out, &format!("{body} = {}", rounded(share)), mass);
     if has_load {
-        line(&mut out, &format!("load = {}", rounded(share)), &format!("{mass}; that both are alike is a guess"));
+        line(&mut out, &format!("load = {}", rounded(share)), &format!("{mass}; equal inertias are a guess"));
     }
     if plan.hand {
-        line(&mut out, "hand = 0.0", "moved by whoever holds the device");
+        line(&mut out, "hand = 0.0", "moved by the user");
     }
     out.push('\n');
     element(&mut out, "bearing", "damper", [body, "ground"], ("damping", damping, damps));
@@ -91,13 +91,14 @@ pub fn model(plan: &Plan, seen: &Seen, name: &str) -> String {
     }
     let _ = writeln!(
         out,
-        "# What you know of already goes here too, such as dry friction; `diagnose` looks for what is not here:\n# [[elements]]\n# name = \"friction\"\n\
-         # kind = \"coulomb\"\n# between = [\"{body}\", \"ground\"]\n# force = 0.01                     # {force}\n"
+        "# Add effects that you know already, such as dry friction; `diagnose` searches for those that are missing here:\n# \
+         [[elements]]\n# name = \"friction\"\n# kind = \"coulomb\"\n# between = [\"{body}\", \"ground\"]\n# force = \
+         0.01                     # {force}\n"
     );
     let _ = writeln!(out, "[[inputs]]\nname = {}", string(&plan.drive.name));
     match plan.driven {
         Driven::Motion => {
-            line(&mut out, "kind = \"motion\"", "the recording prescribes where this body is");
+            line(&mut out, "kind = \"motion\"", "the recording prescribes the motion of this body");
             let _ = writeln!(out, "on   = \"{body}\"");
         }
         Driven::Force | Driven::Current => {
@@ -106,7 +107,7 @@ pub fn model(plan: &Plan, seen: &Seen, name: &str) -> String {
         }
     }
     if plan.hand {
-        line(&mut out, "\n[[inputs]]\nname = \"hand\"\nkind = \"motion\"", "nobody measured it: see [unknown] in set.toml");
+        line(&mut out, "\n[[inputs]]\nname = \"hand\"\nkind = \"motion\"", "not measured: see [unknown] in set.toml");
         let _ = writeln!(out, "on   = \"hand\"");
     }
     let mut output = |signal: &Signal, kind: &str, of: &str, more: Option<(String, String)>| {
@@ -161,21 +162,21 @@ fn rule(rule: &ColumnRule) -> String {
 /// The set file, beside a model of this name.
 pub fn set(plan: &Plan, seen: &Seen, model: &str) -> String {
     let mut out = String::from(
-        "# Recordings of one device and how they are read, written by `backdrive init`; docs/own-recording.md says what else may stand here.\n",
+        "# Recordings of one device and how they are read, written by `backdrive init`; docs/own-recording.md lists all keys.\n",
     );
     let _ = writeln!(out, "model    = {}\nfit      = {}", string(model), list(&seen.fit));
     if !seen.held_out.is_empty() {
-        line(&mut out, &format!("held_out = {}", list(&seen.held_out)), "no fit sees it: it checks what was found");
+        line(&mut out, &format!("held_out = {}", list(&seen.held_out)), "no fit uses it: it tests the findings");
     }
     match seen.start {
         Start::Rest => {
-            line(&mut out, "initial  = \"rest\"", "each begins at rest at 0; \"free\": where and how fast it begins is estimated")
+            line(&mut out, "initial  = \"rest\"", "each begins at rest at 0; \"free\": position and velocity at the start are estimated")
         }
-        Start::Free => line(&mut out, "initial  = \"free\"", "where and how fast each begins is estimated; \"rest\": at rest at 0"),
+        Start::Free => line(&mut out, "initial  = \"free\"", "position and velocity at the start are estimated; \"rest\": at rest at 0"),
     }
     let _ = writeln!(
         out,
-        "\n# The model's name of a signal, and where it stands. The value in SI units of `unit` is multiplied by `scale`.\n[columns]"
+        "\n# The model's name of a signal, and its column. The value, converted from `unit` to SI, is multiplied by `scale`.\n[columns]"
     );
     for (name, of) in plan.columns() {
         let _ = writeln!(out, "{} = {}", key(&name), rule(&of));
@@ -183,13 +184,14 @@ pub fn set(plan: &Plan, seen: &Seen, model: &str) -> String {
     if plan.hand {
         let _ = writeln!(
             out,
-            "\n# Nobody measured the hand: a curve of its own in every recording, no faster than this.\n[unknown]\nhand = {{ bandwidth_hz = 5.0 }}"
+            "\n# The hand was not measured: its motion is estimated in every recording, up to this bandwidth.\n[unknown]\nhand = {{ \
+                bandwidth_hz = 5.0 }}"
         );
     }
     if let Some(file) = seen.fit.first() {
         let _ = writeln!(
             out,
-            "\n# Of a long file a piece, of a file with several runs one:\n# [files.{}]\n# rows  = [0, 20000]\n# where = {{ run = 3 }}",
+            "\n# Part of a long file, or one run of a file with several runs:\n# [files.{}]\n# rows  = [0, 20000]\n# where = {{ run = 3 }}",
             string(file)
         );
     }

@@ -108,7 +108,7 @@ fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool
             if !begun {
                 match Alone::new(graph, &node.name, &window.recorded) {
                     Ok(alone) => *running = Some(alone),
-                    Err(error) => of.notes.push(format!("{}: what it makes of its inputs was not looked at: {error}", node.name)),
+                    Err(error) => of.notes.push(format!("{}: its response to its inputs was not checked: {error}", node.name)),
                 }
             }
             let Some(alone) = running.as_mut() else { continue };
@@ -122,7 +122,7 @@ fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool
     for (index, of) in nodes.iter().zip(&mut found) {
         let Some(node) = graph.nodes.get(*index) else { continue };
         let absent: std::collections::BTreeSet<String> = of.absent.drain(..).filter(|topic| !of.looked_at.contains(topic)).collect();
-        let note = |topic| format!("{topic} was not recorded, so what {} makes of its inputs was not looked at", node.name);
+        let note = |topic| format!("{topic} was not recorded, so the response of {} to its inputs was not checked", node.name);
         of.notes.extend(absent.into_iter().map(note));
     }
     Ok(found)
@@ -175,9 +175,9 @@ impl Contradiction {
     fn sentence(&self) -> String {
         let Contradiction { what, topic, node, from_s, to_s, .. } = self;
         match &self.how {
-            How::Silent(due) => format!("{topic} says nothing in {due} steps in which {node} puts something out"),
+            How::Silent(due) => format!("{topic} has no message in {due} steps in which {node} should publish"),
             How::Differs(how) => {
-                format!("{what} is {how} what {node} makes of its recorded inputs, from {from_s:.3} s to {to_s:.3} s")
+                format!("{what} is {how} the response of {node} to its recorded inputs, from {from_s:.3} s to {to_s:.3} s")
             }
         }
     }
@@ -319,14 +319,14 @@ fn differs(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f6
     let is_factor = gain.is_finite() && (yy - gain * xy).max(0.0).sqrt() <= 0.1 * yy.sqrt() && gain != 0.0;
     let how = match compared.as_if {
         AsIf::Changed { gain, late } if late > 0 && (gain - 1.0).abs() < 0.02 => {
-            format!("{:.1} ms late", 1e3 * late as f64 * place.period_s)
+            format!("{:.1} ms behind", 1e3 * late as f64 * place.period_s)
         }
-        AsIf::Changed { gain, late } if late > 0 => format!("{gain:.4} times, and {:.1} ms late,", 1e3 * late as f64 * place.period_s),
+        AsIf::Changed { gain, late } if late > 0 => format!("{gain:.4} times, and {:.1} ms behind,", 1e3 * late as f64 * place.period_s),
         AsIf::Changed { gain, .. } => format!("{gain:.4} times"),
-        AsIf::Dead { .. } => "standing still, and not".to_owned(),
-        AsIf::Unsteady { .. } => "unevenly late,".to_owned(),
+        AsIf::Dead { .. } => "constant, unlike".to_owned(),
+        AsIf::Unsteady { .. } => "irregularly delayed against".to_owned(),
         _ if is_factor => format!("{gain:.4} times"),
-        _ => format!("{:.0} % apart from", 100.0 * compared.share),
+        _ => format!("{:.0} % different from", 100.0 * compared.share),
     };
     place.contradicted(How::Differs(how), first, last)
 }
@@ -370,5 +370,5 @@ fn not_looked_at(reader: &Reader, graph: &Graph, looked_at: &[String]) -> Option
         .zip(reader.counts())
         .filter(|(topic, count)| topic.kind == Some(backdrive_msgs::topic::Kind::Sample) && **count > 0);
     let others: Vec<&str> = samples.map(|(topic, _)| topic.name.as_str()).filter(|name| !used.iter().any(|used| used == name)).collect();
-    (!others.is_empty()).then(|| format!("recorded and not looked at: {}", others.join(", ")))
+    (!others.is_empty()).then(|| format!("recorded, but not checked: {}", others.join(", ")))
 }

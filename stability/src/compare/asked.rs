@@ -70,8 +70,11 @@ impl Asked {
             let before = knows(&graph);
             rival.settle(&mut graph).map_err(wrong)?;
             match (rival, before, knows(&graph)) {
-                (Rival::Canceller, false, true) => notes
-                    .push("the graph's canceller subtracts nothing: here it knows the simulated master and its grip exactly".to_string()),
+                (Rival::Canceller, false, true) => notes.push(
+                    "the graph's canceller subtracts nothing: in this comparison it uses the exact model of the simulated master \
+                        and its grip"
+                        .to_string(),
+                ),
                 (Rival::Law(0), true, false) => notes.push("the laws run without the graph's canceller".to_string()),
                 _ => {}
             }
@@ -80,7 +83,7 @@ impl Asked {
         let comparison = Comparison { rivals, conditions: options.conditions.clone(), intents, search: Comparison::SEARCH };
         if comparison.rivals.iter().any(|(_, g)| g.gains.mu * g.gains.lambda <= 0.0) {
             return Err(AskedError(format!(
-                "{}: mu*lambda is 0, so nothing would be felt; name a force scale with --lambda",
+                "{}: mu*lambda is 0, so no force would be reflected; name a force scale with --lambda",
                 path.display()
             )));
         }

@@ -60,7 +60,7 @@ impl<'a> Signals<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoCoupling {
     /// Too little of it.
-    #[error("{seconds:.2} s of whole rows are too few to tell a law from")]
+    #[error("{seconds:.2} s of complete rows are too short to identify a law")]
     TooShort {
         /// s.
         seconds: f64,
@@ -155,7 +155,7 @@ impl Kind {
             Kind::ForceReflection => "position to the slave, measured force to the master",
             Kind::FourChannel => "positions and measured forces",
             Kind::OneWay => "one way only",
-            Kind::Uncoupled => "none: neither motor looks at the other side",
+            Kind::Uncoupled => "none: neither motor depends on the other side",
             Kind::Other => "of another kind",
         }
     }

@@ -41,12 +41,12 @@ impl SideLaw {
             }
         };
         tell("speeds filtered by", &self.filter_s);
-        tell("motion late by", &self.delay_s);
-        tell("force late by", &self.force_delay_s);
+        tell("motion delayed by", &self.delay_s);
+        tell("force delayed by", &self.force_delay_s);
         if let Some(limit) = self.limit {
             more.push(format!("clamped at {limit:.4}"));
         }
-        more.push(format!("leaves {:.1e} of its variance in unseen time up to {:.0} Hz", self.unexplained, self.band_hz));
+        more.push(format!("leaves {:.1e} of its variance unexplained in held-out time, up to {:.0} Hz", self.unexplained, self.band_hz));
         let law = if terms.is_empty() { "nothing".to_owned() } else { terms.join(" + ") };
         format!("{force} = {law}; {}", more.join(", "))
     }

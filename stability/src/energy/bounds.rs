@@ -34,11 +34,11 @@ pub(super) fn bounds(
             })?,
     };
     if !(environment.is_finite() && environment > 0.0) {
-        return Err(format!("the static stiffness of slave and environment is {environment} N/m: there is no wall to display"));
+        return Err(format!("the static stiffness of slave and environment is {environment} N/m: there is no stiff contact to display"));
     }
     let mut gains: Vec<f64> = touching.iter().flat_map(|r| r.clone()).map(|row| gain_at(session, row)).filter(|g| g.is_finite()).collect();
     gains.sort_by(f64::total_cmp);
-    let gain = gains.get(gains.len() / 2).copied().ok_or("nothing was touched at a known gain")?;
+    let gain = gains.get(gains.len() / 2).copied().ok_or("there was no contact at a known gain")?;
 
     let mut notes = Vec::new();
     let own = to_ground(model, place.user, &mut notes);
@@ -132,7 +132,7 @@ fn to_ground(model: &Model, user: usize, notes: &mut Vec<String>) -> ToGround {
                 sum.coulomb += level(Side::Forwards).min(level(Side::Backwards));
             }
             Role::Path => {
-                notes.push(format!("what {} ({}) adds to b and f_c is not counted", element.name, element.law.kind().name));
+                notes.push(format!("the contribution of {} ({}) to b and f_c is not included", element.name, element.law.kind().name));
             }
         }
     }

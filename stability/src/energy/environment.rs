@@ -14,7 +14,7 @@ pub(super) fn environment_stiffness(graph: &Graph, index: usize, signals: &AxisS
     let fragment = files.fragment.as_ref().ok_or("the slave has no environment")?;
     let axis = model.axes.get(index).cloned().ok_or_else(|| format!("the slave's model has no axis {index}"))?;
     if model.inputs.get(axis.feedback).is_some_and(|input| input.kind == InputKind::Force) {
-        return Err("the slave is driven by a controller's force, and how stiff that holds it is not told from its model".to_owned());
+        return Err("the slave is driven by a controller's force, so its stiffness does not follow from its model".to_owned());
     }
     let attached = model.attach(fragment, axis.user, &fragment.network.name);
     let tip = signals.slave.as_ref().unwrap_or(&signals.command);

@@ -65,7 +65,7 @@ impl Frequency {
             return answer;
         }
         if !(gain.is_finite() && gain >= 0.0) {
-            answer.reason = format!("the gain must be a number not below 0, is {gain}");
+            answer.reason = format!("the gain must be a number of at least 0, is {gain}");
             return answer;
         }
         let all = self.levels.iter().map(|level| (level, margins_at(level, gain), level_verdict(level, gain)));
@@ -111,7 +111,7 @@ fn level_verdict(level: &LevelEstimate, gain: f64) -> (Verdict, String) {
     if told_to.is_some_and(|most| gain > most) {
         let most = told_to.unwrap_or(0.0);
         let reason =
-            format!("beyond a gain of {most:.3} lines that are lost in noise, or what lies above the highest line, may hide an edge");
+            format!("above a gain of {most:.3}, lines lost in noise or frequencies above the highest line may hide a stability limit");
         // A known stability limit lies below: then the noise does not matter.
         if !ci95.and_then(|c| c.1).is_some_and(|high| gain > high) {
             return (Verdict::CannotTell, reason);
@@ -122,20 +122,29 @@ fn level_verdict(level: &LevelEstimate, gain: f64) -> (Verdict, String) {
             let how = if hz > 0.0 { format!("at {hz:.1} Hz") } else { "without oscillating".to_string() };
             let upper = high.map_or("open".to_string(), |h| format!("{h:.3}"));
             if gain < low {
-                (Verdict::Stable, format!("below the edge, {critical:.3} ({low:.3} to {upper}), where it runs away {how}"))
+                (
+                    Verdict::Stable,
+                    format!("below the stability limit, {critical:.3} ({low:.3} to {upper}), where it becomes unstable {how}"),
+                )
             } else if high.is_some_and(|high| gain > high) {
                 if stable_again(level, gain) {
-                    return (Verdict::Stable, format!("beyond the first edge at {critical:.3} {how}, and stable again"));
+                    return (Verdict::Stable, format!("above the first stability limit at {critical:.3} {how}, and stable again"));
                 }
-                (Verdict::Unstable, format!("beyond the edge, {critical:.3} ({low:.3} to {upper}): it runs away {how}"))
+                (Verdict::Unstable, format!("above the stability limit, {critical:.3} ({low:.3} to {upper}): it is unstable {how}"))
             } else {
-                (Verdict::CannotTell, format!("too close to call: the edge lies at {critical:.3} ({low:.3} to {upper}), {how}"))
+                (Verdict::CannotTell, format!("too close to call: the stability limit is {critical:.3} ({low:.3} to {upper}), {how}"))
             }
         }
         _ => match at_least {
-            Some(least) if gain < least => (Verdict::Stable, format!("no line reaches the edge below a gain of {least:.3}")),
-            Some(least) => (Verdict::CannotTell, format!("the uncertainty of the lines leaves room for an edge from {least:.3} on")),
-            None => (Verdict::CannotTell, "no line tells where the loop is".to_string()),
+            Some(least) if gain < least => (Verdict::Stable, format!("no line reaches the stability limit below a gain of {least:.3}")),
+            Some(least) => (
+                Verdict::CannotTell,
+                format!(
+                    "within the uncertainty of the lines, the stability limit may be as low as \
+                {least:.3}"
+                ),
+            ),
+            None => (Verdict::CannotTell, "no line determines the loop".to_string()),
         },
     }
 }

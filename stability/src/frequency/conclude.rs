@@ -142,8 +142,8 @@ fn describe(level: &LevelEstimate) -> String {
     let by = if level.amplitude_rms > 0.0 { "the dither as instrument" } else { "intent and force as inputs" };
     format!(
         "loop by cross-spectra with {by}: {cut}, {:.1} independent averages, lines {:.2} Hz apart, locally quadratic over 6 % of the \
-         frequency; a line counts where the loop is {} times its standard deviation; interval from draws of the noise, with half the \
-         resolution for the bias",
+         frequency. A line is used if the loop is {} times its standard deviation. The interval is from draws of the noise, with half \
+         the resolution for the bias",
         a.averages,
         a.resolution_hz,
         edge::TOLD

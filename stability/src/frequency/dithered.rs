@@ -57,8 +57,8 @@ pub(super) fn dithered(prepared: &Prepared, options: &Options, result: &mut Freq
         let c = rows.count;
         let reason = if c.used == 0 {
             format!(
-                "no row has the slave in contact, the dither on, the hand at rest and nothing clamped: of {} rows {} touch nothing, in {} \
-                 the hand moves, in {} a clamp acts, in {} nothing shakes, in {} the loop settles, in {} something is missing",
+                "no row has contact, dither, a hand at rest and no clamp. Of {} rows {} are without contact, in {} the hand moves, in {} \
+                 a clamp acts, in {} there is no dither, in {} the loop settles, in {} a sample is missing",
                 c.all, c.free, c.moving, c.clamped, c.quiet, c.settling, c.missing
             )
         } else {

@@ -66,31 +66,38 @@ impl fmt::Display for Note {
             Note::MuFromSignals { mu, lag } => {
                 write!(f, "mu was not recorded: {mu:.4} from the signals, x_c following x_m by {lag} rows")
             }
-            Note::GainsUnknown => {
-                f.write_str("the gains were not recorded and the signals do not tell them: all gains are multiples of the recorded one")
-            }
-            Note::HandNeverRests => {
-                f.write_str("the hand never rests in contact: all of the contact was used, and below a few Hz its motion is noise")
-            }
+            Note::GainsUnknown => f.write_str(
+                "the gains were not recorded and cannot be estimated from the signals: all gains are multiples of the \
+                    recorded one",
+            ),
+            Note::HandNeverRests => f.write_str(
+                "the hand never rests in contact: the whole contact was used, and below a few Hz the hand's motion acts as \
+                    noise",
+            ),
             Note::ContactLost { times } => {
-                write!(f, "contact was lost {times} times; rows without contact and 200 ms after are left out")
+                write!(f, "contact was lost {times} times; rows without contact and the 200 ms after are omitted")
             }
-            Note::DitherTooShort { rms } => write!(f, "a dither of {rms:.3} rms acts too shortly to be estimated"),
+            Note::DitherTooShort { rms } => write!(f, "a dither of {rms:.3} rms acts too briefly to be used"),
             Note::OperatorBand { hz } => {
-                write!(f, "the operator shakes the loop up to {hz:.0} Hz only; an edge above that is not seen")
+                write!(f, "the operator excites the loop only up to {hz:.0} Hz; a stability limit above that frequency is not visible")
             }
-            Note::NoDither => f.write_str("no dither was recorded: the operator's intent, in free motion and in contact, took its place"),
-            Note::GainsDisagree => f.write_str("the recorded gains give different edges: the loop depends on its gain or its amplitude"),
-            Note::AmplitudeDependent => {
-                f.write_str("the edge depends on the amplitude of the dither: friction, hysteresis or backlash in the loop")
-            }
+            Note::NoDither => f.write_str("no dither was recorded: the operator's intent, in free motion and in contact, was used instead"),
+            Note::GainsDisagree => f.write_str(
+                "the recorded gains give different stability limits: the loop depends on its gain or its \
+                amplitude",
+            ),
+            Note::AmplitudeDependent => f.write_str(
+                "the stability limit depends on the amplitude of the dither: the loop contains friction, hysteresis or \
+                    backlash",
+            ),
             Note::ContinuedToLarge { gain } => write!(
                 f,
-                "the interval is continued to large amplitudes, where the edge tends to {gain:.3} by the describing function of dry friction"
+                "the interval is extended to large amplitudes, where the limit tends to {gain:.3} by the describing function of dry \
+                    friction"
             ),
             Note::ContinuedToRest { gain } => write!(
                 f,
-                "the interval is continued to rest: while dry friction holds the master the canceller subtracts all the same, and the edge is \
+                "the interval is extended to rest: while dry friction holds the master the canceller still subtracts, and the limit is \
                  {gain:.3}"
             ),
         }

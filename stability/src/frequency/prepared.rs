@@ -152,5 +152,5 @@ pub(super) fn advice(session: &Session) -> String {
     }
     let rms = (sum / count.max(1) as f64).sqrt();
     let text = if rms > 0.5 { format!("multisine:peak={:.2},from=1,to=500,period=2", 0.1 * rms) } else { DEFAULT_DITHER.to_string() };
-    format!("record again with --dither {text}, the hand pressing and at rest for 10 s")
+    format!("record again with --dither {text}, with the hand pressing and at rest for 10 s")
 }

@@ -41,11 +41,12 @@ pub enum PartError {
     #[error("{0}: has no model to take the response from; give a model file")]
     NoModel(&'static str),
     /// A controller drives the slave, and the model alone does not determine its response.
-    #[error("slave: a controller drives it, so that its response does not follow from its model alone; run the graph with it instead")]
+    #[error("slave: a controller drives it, so its response does not follow from its model alone; run the graph with it instead")]
     Driven,
     /// What the slave touches is at a point of it.
     #[error(
-        "slave: what it touches is attached elsewhere than at its axes (environment_on, touches), so that its response about the contact does not follow from their positions; run the graph with it instead"
+        "slave: its environment is not attached at its axes (environment_on, touches), so its response in contact does not follow from \
+            their positions; run the graph with it instead"
     )]
     Touches,
     /// The model has not as many axes as the session.

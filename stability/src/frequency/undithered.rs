@@ -28,14 +28,14 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
     };
     let session = &prepared.session;
     if options.parts.any() {
-        return cannot("without a recorded dither the parts of the loop cannot be told apart, so none can be exchanged", result);
+        return cannot("without a recorded dither the parts of the loop cannot be separated, so none can be exchanged", result);
     }
     if session.axes.len() != 1 {
-        return cannot("without a recorded dither the loops of several axes cannot be told apart", result);
+        return cannot("without a recorded dither the loops of several axes cannot be separated", result);
     }
     let Some(intent) = session.axes.first().and_then(|a| a.intent.clone()) else {
-        let reason = "nothing exogenous was recorded: from the operator's motion alone force and motion give exactly 1/(lambda H_se), \
-                      an infinite edge, whatever the loop is";
+        let reason = "no external excitation was recorded: with the operator's motion alone, force and motion give exactly 1/(lambda \
+                      H_se), an infinite stability limit for any loop";
         return cannot(reason, result);
     };
     let stretches = whole_rows(prepared, &intent);
@@ -45,7 +45,7 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
     let slices: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
     let rows: usize = stretches.iter().map(|s| s.len()).sum();
     let Some(segment) = segment(&stretches, session.period_s) else {
-        return cannot("the record is too short to tell the operator's motion from what the force does", result);
+        return cannot("the record is too short to separate the operator's motion from the effect of the force", result);
     };
     let contact: Vec<Range<usize>> = stretches.iter().flat_map(|s| touching(&session.axes[0].contact, s)).collect();
     let spectra_of = |segment: usize| {
@@ -54,7 +54,7 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
         Some((all, touching))
     };
     let Some((all, touching)) = spectra_of(segment) else {
-        return cannot("the slave never touches anything for long enough", result);
+        return cannot("no contact of the slave lasts long enough", result);
     };
     let shaken = shaken(&all, &[intent_column], MOVED);
     let top_hz = shaken.last().map_or(0.0, |k| all.hz[*k]);
@@ -62,13 +62,13 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
     let broad = apart.last().map_or(0.0, |k| all.hz[*k]);
     if apart.len() < 8 || broad < 10.0 {
         let reason = format!(
-            "nothing exogenous shook the force: the operator's intent reaches up to {top_hz:.0} Hz, and where it does, force and intent \
-             are coherent; G_f can be told from neither"
+            "nothing external excited the force: the operator's intent reaches up to {top_hz:.0} Hz, and there force and intent are \
+             coherent, so G_f cannot be identified from either"
         );
         return cannot(&reason, result);
     }
     let Some(found) = two_inputs(&all, &touching, options, intent_column, &apart, 1.0) else {
-        return cannot("intent and force are too coherent to tell G_f", result);
+        return cannot("intent and force are too coherent to identify G_f", result);
     };
     let half = spectra_of(segment / 2).and_then(|(a, t)| {
         let lines: Vec<usize> = shaken_lines(&a, intent_column, broad);

@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 pub(super) fn loops(graph: &Graph, session: &Session, hz: &[f64]) -> Result<(Vec<Matrix>, Vec<bool>), String> {
     let settings = |kind: NodeKind| graph.node_of(kind).map(|node| &node.settings);
     let Some(Settings::Scaling { .. }) = settings(NodeKind::Scaling) else {
-        return Err("the loop goes through a coupling, whose law is more than a gain".to_string());
+        return Err("the loop contains a coupling, whose law is more than a gain".to_string());
     };
     let (Some(Settings::Master(master)), Some(Settings::Slave(slave))) = (settings(NodeKind::Master), settings(NodeKind::Slave)) else {
         return Err("the graph has no master or no slave".to_string());
@@ -22,7 +22,7 @@ pub(super) fn loops(graph: &Graph, session: &Session, hz: &[f64]) -> Result<(Vec
     let mut motion = master_responses(master, "master", hz, period_s)?;
     match settings(NodeKind::Canceller) {
         Some(Settings::Canceller(_, _, Some(_))) => {
-            return Err("the canceller estimates the hand, and so is no linear part of the loop".to_string());
+            return Err("the canceller estimates the hand, so it is not a linear part of the loop".to_string());
         }
         Some(Settings::Canceller(files, high_pass_hz, None)) if files.model.is_some() => {
             let predicted = master_responses(files, "canceller", hz, period_s)?;
@@ -35,7 +35,7 @@ pub(super) fn loops(graph: &Graph, session: &Session, hz: &[f64]) -> Result<(Vec
     let (contact, touched) = slave_responses(slave, session, hz)?;
     let axes = session.axes.len();
     if motion.iter().chain(&contact).any(|m| m.shape() != (axes, axes)) {
-        return Err(format!("the models have not as many axes as the recording, {axes}"));
+        return Err(format!("the models do not have the {axes} axes of the recording"));
     }
     let late = delay_s(graph)?;
     let round = |((motion, contact), hz): ((&Matrix, &Matrix), &f64)| contact * motion * Complex::new(0.0, -TAU * hz * late).exp();
@@ -44,7 +44,7 @@ pub(super) fn loops(graph: &Graph, session: &Session, hz: &[f64]) -> Result<(Vec
 
 /// From forces that are held over each period to what is measured at its end, m/N and the like.
 fn master_responses(files: &DeviceFiles, part: &str, hz: &[f64], period_s: f64) -> Result<Vec<Matrix>, String> {
-    let mut model = files.model.clone().ok_or_else(|| format!("{part}: a program of its own, which no model tells"))?;
+    let mut model = files.model.clone().ok_or_else(|| format!("{part}: an external program without a model"))?;
     for (index, axis) in model.axes.clone().iter().enumerate().filter(|(_, axis)| !axis.holds_user) {
         if let Some(grip) = &files.fragment {
             model.attach(grip, axis.user, &format!("grip{index}"));
@@ -79,9 +79,9 @@ fn high_pass(corner_hz: f64, hz: f64, period_s: f64) -> Complex<f64> {
 
 /// From commands that run in straight lines to the force of what the slave touches, N/m and the like, about where it touched in the session.
 fn slave_responses(files: &DeviceFiles, session: &Session, hz: &[f64]) -> Result<(Vec<Matrix>, Vec<bool>), String> {
-    let given = files.model.as_ref().ok_or("slave: a program of its own, which no model tells")?;
+    let given = files.model.as_ref().ok_or("slave: an external program without a model")?;
     if given.axes.iter().any(|axis| given.inputs[axis.feedback].kind == InputKind::Force) {
-        return Err("a controller drives the slave, whose law is no part of its model".to_string());
+        return Err("a controller drives the slave, and its law is not part of the model".to_string());
     }
     let options = DeviceOptions { substeps: files.substeps, ..DeviceOptions::default() };
     let mut device =
@@ -91,7 +91,7 @@ fn slave_responses(files: &DeviceFiles, session: &Session, hz: &[f64]) -> Result
     elements.sort_unstable();
     elements.dedup();
     if elements.is_empty() {
-        return Err("the slave has nothing to touch".to_string());
+        return Err("the slave has no environment".to_string());
     }
     let (about, touched) = contact(&mut device, session, &elements)?;
     let mut model = device.model().clone();
@@ -130,7 +130,7 @@ fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result
     let axes_at = |row: usize| session.axes.iter().filter(|axis| touches(axis, row)).count();
     let most = (0..session.len()).map(axes_at).max().unwrap_or(0);
     if most == 0 {
-        return Err("the slave touched nothing in the recording, so the loop was open".to_string());
+        return Err("the slave was not in contact in the recording, so the loop was open".to_string());
     }
     let mut sums = vec![(0.0, 0usize); elements.len()];
     let mut commands = vec![0.0; session.axes.len()];
@@ -172,7 +172,7 @@ fn delay_s(graph: &Graph) -> Result<f64, String> {
         late += connection.delay as f64 * graph.period_s();
         if let Some(impaired) = connection.impairment {
             if impaired.jitter_s > 0.0 || impaired.loss > 0.0 {
-                return Err("a connection of the loop jitters or loses samples, and so is no linear part of it".to_string());
+                return Err("a connection of the loop has jitter or loses samples, so it is not linear".to_string());
             }
             late += impaired.delay_s;
         }

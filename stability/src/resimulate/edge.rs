@@ -260,8 +260,8 @@ impl Bracket {
         };
         if let Outcome::NotJudged { why } = beyond.outcome {
             let reason = match *low > 0.0 {
-                true => format!("stable up to {low:.4}; beyond it cannot be told: {why}"),
-                false => format!("it cannot be told at any gain from {high} on: {why}"),
+                true => format!("stable up to {low:.4}; above that it is not known: {why}"),
+                false => format!("not known at any gain from {high} on: {why}"),
             };
             return (None, limited, reason);
         }
@@ -271,8 +271,10 @@ impl Bracket {
         }
         if beyond.is_unstable() {
             let reason = match beyond.outcome {
-                Outcome::Limited { .. } => format!("{} beyond {edge:.4}, so large that a clamp or the travel ends it", beyond.beneath),
-                other => format!("{other} beyond {edge:.4}"),
+                Outcome::Limited { .. } => {
+                    format!("{} above {edge:.4}, so large that a clamp or the end of travel limits it", beyond.beneath)
+                }
+                other => format!("{other} above {edge:.4}"),
             };
             return (Some(edge), limited, reason);
         }
@@ -281,6 +283,6 @@ impl Bracket {
             None if search.whole_grid => "; no oscillation was seen up to the highest gain".to_string(),
             None => String::new(),
         };
-        (None, Some(edge), format!("a clamp or the travel comes first, from {edge:.4} on{later}"))
+        (None, Some(edge), format!("a clamp or the end of travel acts first, from {edge:.4} on{later}"))
     }
 }

@@ -123,22 +123,22 @@ fn lowest_limit<'a>(balances: impl Iterator<Item = &'a StaticBalance>) -> Option
 fn warning(balances: &[StaticBalance], at_asked: &[(f64, Outcome)]) -> Option<String> {
     let at = |scale: f64| lowest_limit(balances.iter().filter(|b| b.scale == scale)).filter(|limit| *limit < HIGHEST);
     let seen = |scale: f64| match at_asked.iter().find(|(s, _)| *s == scale) {
-        Some((_, Outcome::Unstable { growth_per_s })) => format!("; at the gain asked it grows by {growth_per_s:.2} per second"),
-        Some((_, outcome)) => format!("; at the gain asked: {outcome}"),
+        Some((_, Outcome::Unstable { growth_per_s })) => format!("; at the requested gain it grows by {growth_per_s:.2} per second"),
+        Some((_, outcome)) => format!("; at the requested gain: {outcome}"),
         None => String::new(),
     };
     if let Some(limit) = at(1.0) {
         return Some(format!(
-            "the master with its grip is firmer than the canceller assumes, so too much is taken out at rest: beyond mu*lambda = {limit:.3} \
-             the loop runs away without oscillating{}",
+            "the master with its grip is stiffer than the canceller assumes, so the canceller subtracts too much at rest: above mu*lambda \
+             = {limit:.3} the loop diverges without oscillating{}",
             seen(1.0)
         ));
     }
     let scale = balances.iter().map(|b| b.scale).filter(|s| *s > 1.0 && at(*s).is_some()).min_by(f64::total_cmp)?;
     let limit = at(scale)?;
     Some(format!(
-        "a grip {:.0} % firmer would be firmer than the canceller assumes, and too much taken out at rest: beyond mu*lambda = {limit:.3} \
-         the loop would run away without oscillating{}",
+        "a grip {:.0} % stiffer would be stiffer than the canceller assumes, which would subtract too much at rest: above mu*lambda = \
+         {limit:.3} the loop would diverge without oscillating{}",
         (scale - 1.0) * 100.0,
         seen(scale)
     ))
@@ -247,7 +247,10 @@ pub fn against_none(
     let ends = |edge: &Edge| edge.critical_gain.unwrap_or(if edge.at_least > 0.0 { edge.at_least } else { search.lowest });
     let (end, end_without) = (ends(with), ends(&without));
     let warning = (with.outcome_beyond.is_some() && end < end_without * (1.0 - search.tolerance)).then(|| {
-        format!("the canceller makes it worse than none: stable to mu*lambda = {end:.3} with it, to {end_without:.3} without; its model does not fit the master or the grip")
+        format!(
+            "the loop is less stable with the canceller (up to mu*lambda = {end:.3}) than without ({end_without:.3}): its model does \
+            not fit the master or the grip"
+        )
     });
     Ok(Some(AgainstNone { without, warning }))
 }

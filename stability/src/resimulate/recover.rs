@@ -59,7 +59,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
         return Err(cannot("the graph has no master"));
     };
     let Some(model) = &files.model else {
-        return Err(cannot("the master is a program of its own; say with --master FILE which model it follows"));
+        return Err(cannot("the master is an external program; give its model with --master FILE"));
     };
     if model.axes.len() != session.axes.len() {
         return Err(cannot(&format!("the master's model has {} axes, the session {}", model.axes.len(), session.axes.len())));
@@ -82,7 +82,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
     let device = Device::new(model, files.fragment.as_ref(), device::DeviceRole::Master, session.period_s, &options)
         .map_err(|error| ResimulateError::Device { what: "the master", error })?;
     if (0..device.axes()).any(|axis| !device.has_hand(axis)) {
-        return Err(cannot("no grip with a hand holds the master; say with --grip FILE which one did"));
+        return Err(cannot("no grip with a hand is attached to the master; name it with --grip FILE"));
     }
 
     let filter = Filter::new(rows, session.period_s);
@@ -113,7 +113,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
             intent.iter_mut().zip(correction).for_each(|(x, c)| *x += c);
         }
     }
-    let Some((_, mut intents)) = best else { return Err(cannot("the master's model runs away under the recorded force")) };
+    let Some((_, mut intents)) = best else { return Err(cannot("the master's model diverges under the recorded force")) };
     let rests = rests(&intents, &measured, session);
     for intent in &mut intents {
         for (from, to) in &rests {

@@ -28,12 +28,12 @@ impl Script {
         match graph.node_of(NodeKind::Operator).map(|n| &n.settings) {
             Some(Settings::Operator(intents)) => {
                 if intents.iter().all(|i| *i == Intent::Rest) {
-                    return Err(FileError::whole(&name, "its operator rests, so nothing would be touched; give it waypoints"));
+                    return Err(FileError::whole(&name, "its operator rests, so there would be no contact; give it waypoints"));
                 }
                 let title = if graph.title.is_empty() { name } else { graph.title.clone() };
                 Ok(Script { name: title, intents: intents.clone(), duration_s: graph.duration_s() })
             }
-            _ => Err(FileError::whole(&name, "has no operator node, so it is no script of a hand")),
+            _ => Err(FileError::whole(&name, "has no operator node, so it does not describe a motion of the hand")),
         }
     }
 }

@@ -137,7 +137,7 @@ fn a_force_clamp_comes_before_any_oscillation() {
     assert_eq!(found.critical_gain, None, "{}", found.reason);
     let limited = found.limited_from.unwrap();
     assert!(matches!(found.outcome_beyond, Some(Outcome::Limited { .. })) && found.at_least < limited && limited < 1.01 * found.at_least);
-    assert!(found.reason.contains("comes first"), "{}", found.reason);
+    assert!(found.reason.contains("acts first"), "{}", found.reason);
 }
 
 #[test]
@@ -211,11 +211,11 @@ fn a_softer_grip_in_the_model_is_flagged_and_its_limit_exact() {
     assert!((at(1.0).unwrap() / limit - 1.0).abs() < 1e-3, "{:?} {limit}", at(1.0));
     // A grip 0.7 times as firm would be softer still than assumed: no limit at DC there... 1/(0.7*400) < 1.5/400.
     assert!(at(1.3).unwrap() < limit && at(0.7).unwrap() > limit);
-    assert!(told.warning.as_ref().unwrap().contains("runs away without oscillating"), "{:?}", told.warning);
+    assert!(told.warning.as_ref().unwrap().contains("diverges without oscillating"), "{:?}", told.warning);
 
     let found = find(&scenario, &coarse(0.02, 5.0));
     let against = against_none(&scenario, &found, &coarse(0.02, 5.0), &RunOptions::default(), &|_, _| {}, &NEVER).unwrap().unwrap();
-    assert!(against.warning.unwrap().contains("worse than none"));
+    assert!(against.warning.unwrap().contains("less stable with the canceller"));
     assert!(found.critical_gain.unwrap() < against.without.critical_gain.unwrap());
 }
 
@@ -238,7 +238,7 @@ fn beyond_the_dc_limit_it_runs_away_and_the_growth_is_told() {
     let exact = linear(Some("plant/models/impulse-engine-linear.toml"));
     let told = over_cancelling(&exact, &grips::SCALES, None, &RunOptions::default(), &NEVER).unwrap();
     assert!(told.balances.iter().filter(|b| b.scale <= 1.0).all(|b| b.dc_limit.is_none()));
-    assert!(told.warning.unwrap().contains("15 % firmer would be"));
+    assert!(told.warning.unwrap().contains("15 % stiffer would be"));
     assert!(over_cancelling(&exact, &[0.7, 1.0], None, &RunOptions::default(), &NEVER).unwrap().warning.is_none());
 }
 

@@ -9,7 +9,7 @@ use backdrive_nodes::sequence::SequenceError;
 #[derive(Debug, thiserror::Error)]
 pub enum ResimulateError {
     /// A part of the loop is missing.
-    #[error("{graph}: has no {kind} node, so there is no loop to run again")]
+    #[error("{graph}: has no {kind} node, so there is no loop to re-simulate")]
     NoLoop {
         /// Path of the graph or bag.
         graph: String,
@@ -23,7 +23,7 @@ pub enum ResimulateError {
         graph: String,
     },
     /// A part of the loop is a program of the user's own.
-    #[error("node \"{node}\" is a program of its own, which cannot be run again here; say what it does with {option} FILE")]
+    #[error("node \"{node}\" is an external program, which cannot be re-simulated; give its model with {option} FILE")]
     OwnProgram {
         /// The node.
         node: String,

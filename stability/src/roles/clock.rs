@@ -21,8 +21,8 @@ pub(super) fn on_one_clock(wanted: &[(SignalRole, &Located)], series: &[Series],
             place.map_or(String::new(), |(_, located)| located.signal.topic.clone())
         };
         notes.push(format!(
-            "stamps of {} and {} are of different clocks: against the log times they are {:.3} s apart; they are aligned by their log \
-             times, so what the messages took on their way is in the delay",
+            "time stamps of {} and {} come from different clocks ({:.3} s apart relative to log time); the signals are aligned by log \
+             time, so the delay includes transport",
             name(least),
             name(most),
             most.saturating_sub(least) as f64 * 1e-9

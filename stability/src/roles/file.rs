@@ -246,7 +246,7 @@ fn read_table(mut table: Table, key: &str, hold: Hold) -> Result<Located, FileEr
     };
     let scale = table.number_or("scale", Range::Any, 1.0)?;
     if scale == 0.0 {
-        return Err(table.error_at("scale", "must not be 0: the signal would be gone"));
+        return Err(table.error_at("scale", "must not be 0: it would remove the signal"));
     }
     let offset = table.number_or("offset", Range::Any, 0.0)?;
     let hold = table.one_of("hold", &[("linear", Hold::Linear), ("zero", Hold::Zero)])?.unwrap_or(hold);

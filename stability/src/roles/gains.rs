@@ -69,7 +69,7 @@ pub(super) fn settle_gains(session: &mut Session, roles: &Roles) {
     let mut told = Vec::new();
     let mut estimate = |name: &str, found: Option<Fit>, over: &str| match found {
         None => {
-            told.push(format!("{name} is not in the roles file and cannot be estimated: there is too little motion or contact"));
+            told.push(format!("{name} is not in the roles file and cannot be estimated: the recording has too little motion or contact"));
             f64::NAN
         }
         Some(fit) => {
@@ -105,28 +105,28 @@ pub(super) fn check_signs(session: &mut Session) {
     for axis in session.axes.iter().filter(|a| a.slave_force.is_none() || a.slave.is_none()) {
         let (contact, _) = touching(axis, session.period_s);
         if contact.is_empty() {
-            warnings.push(format!("axis {}: nothing was touched", axis.name));
+            warnings.push(format!("axis {}: there was no contact", axis.name));
             continue;
         }
         let dents = fit(&axis.command, &axis.contact, &contact, most_lag);
         if dents.is_some_and(|f| f.slope > 0.0 && f.explained > 0.25) {
             warnings.push(format!(
-                "axis {}: F_s rises with x_c, as if contact pulled; contact should push back: is the sign of F_s (or of x_c) turned round? \
-                 scale = -1 turns it",
+                "axis {}: F_s rises with x_c, as if the contact pulled: is the sign of F_s or x_c wrong? Correct it with scale = -1",
                 axis.name
             ));
         }
         let felt = fit(&axis.contact, &reflected(axis), &contact, most_lag);
         if felt.is_some_and(|f| f.slope < 0.0 && f.explained > 0.25) {
             warnings.push(format!(
-                "axis {}: F_f goes against lambda F_s; the reflected force should have the sign of the contact force: scale = -1 turns one",
+                "axis {}: F_f has the opposite sign of lambda F_s; the reflected force should have the sign of the contact force: correct \
+                    one with scale = -1",
                 axis.name
             ));
         }
         let (_, free) = touching(axis, session.period_s);
         let follows = fit(&axis.master, &axis.command, &free, most_lag);
         if follows.is_some_and(|f| f.slope < 0.0 && f.explained > GOOD_FIT) {
-            warnings.push(format!("axis {}: x_c runs against x_m in free motion: scale = -1 turns one", axis.name));
+            warnings.push(format!("axis {}: x_c moves opposite to x_m in free motion: correct one with scale = -1", axis.name));
         }
     }
     session.notes.extend(warnings);

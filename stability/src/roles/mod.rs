@@ -97,13 +97,13 @@ impl Session {
                 put(&mut axis, *role, laid.values);
             }
             if axis.resolution > 0.0 {
-                notes.push(format!("axis {}: x_m comes in steps of {:.3e}", axis.name, axis.resolution));
+                notes.push(format!("axis {}: x_m has a resolution of {:.3e}", axis.name, axis.resolution));
             }
             if axis.command.is_empty() {
                 // The slave follows the master itself.
                 let mu = roles.mu.unwrap_or(1.0);
                 axis.command = axis.master.iter().map(|x| mu * x).collect();
-                notes.push(format!("axis {}: nobody commands the slave a position; x_c is taken to be {mu} x_m", axis.name));
+                notes.push(format!("axis {}: no position command of the slave was recorded; x_c is assumed to be {mu} x_m", axis.name));
             }
             axes.push(axis);
         }
@@ -127,7 +127,7 @@ impl Session {
 }
 
 fn rate_source(roles: &Roles) -> &'static str {
-    if roles.rate_hz.is_some() { "the rate is the roles file's" } else { "the rate is that of the most frequent signal" }
+    if roles.rate_hz.is_some() { "the rate is given in the roles file" } else { "the rate is that of the most frequent signal" }
 }
 
 fn put(axis: &mut AxisSignals, role: SignalRole, values: Vec<f64>) {

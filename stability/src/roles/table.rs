@@ -44,7 +44,7 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
     let table = read(None).or_else(|_| read(Some(&asked)))?;
     let stamps: Vec<i64> = table.t.iter().map(|t| (t * 1e9).round() as i64).collect();
     let series = wanted.iter().zip(&columns).map(|((_, located), column)| {
-        let values = values_of(&table, column).ok_or_else(|| roles.at(located, format!("{column} holds no numbers")))?;
+        let values = values_of(&table, column).ok_or_else(|| roles.at(located, format!("{column} contains no numbers")))?;
         let values = values.iter().map(|x| located.signal.scale * x + located.signal.offset).collect();
         Ok(Series { stamps: stamps.clone(), logged: stamps.clone(), values, stamped: true })
     });

@@ -36,7 +36,8 @@ impl Answer {
             let sides = [(&coupling.master, "F_f", "x_m"), (&coupling.slave, "tau_s", "x_s")];
             warnings.extend(sides.iter().filter(|(side, ..)| side.pushes_apart()).map(|(_, force, position)| {
                 Warning::Recording(format!(
-                    "{force} pushes the two sides apart: is its sign, or that of {position}, turned round? scale = -1 in the roles file turns it"
+                    "{force} pushes the two sides apart: is its sign, or that of {position}, wrong? Correct it with scale = -1 in the \
+                        roles file"
                 ))
             }));
         }
@@ -57,7 +58,7 @@ impl Answer {
             frequency_answer: None,
             frequency: None,
             resimulated: None,
-            no_resimulation: Some("the models of the two devices are not in the recording".to_owned()),
+            no_resimulation: Some("the recording does not contain the models of the two devices".to_owned()),
             recorded_outcome: outcome,
             recorded_energy: energy(session, question.recorded, None),
             transparency: transparency(session, question.recorded),
@@ -102,17 +103,17 @@ fn axis(session: &Session, index: usize) -> Option<CoupledAxis> {
 fn reason(coupled: &[CoupledAxis], outcome: Option<Outcome>) -> String {
     let Some(outcome) = outcome else { return "no axis has both positions and both motors' forces".to_owned() };
     let Some(axis) = coupled.iter().find(|c| c.outcome == outcome) else { return outcome.to_string() };
-    let touched = format!("F_s was {:.3} at most, and nothing is said of what was not touched", axis.largest_contact);
+    let touched = format!("F_s was at most {:.3}; this answer does not cover stiffer contact", axis.largest_contact);
     let mode = axis.slowest_mode.map(|m| {
         let what = if m.of_error { "the difference of the positions" } else { "the master" };
         format!(
-            "the slowest oscillation, {:.1} Hz in {what}, dies by {:.0} per second (95 %: {:.0} to {:.0})",
+            "the least damped oscillation, {:.1} Hz in {what}, decays by {:.0} per second (95 %: {:.0} to {:.0})",
             m.frequency_hz, m.per_s, m.ci95[0], m.ci95[1]
         )
     });
     match (outcome, mode) {
         (Outcome::Stable, Some(mode)) => format!("in the recording, at its own gains, while the hand moves: {mode}; {touched}"),
-        (Outcome::Stable, None) => format!("in the recording, at its own gains, nothing oscillates while the hand moves; {touched}"),
+        (Outcome::Stable, None) => format!("in the recording, at its own gains, no oscillation while the hand moves; {touched}"),
         (outcome, Some(mode)) => format!("in the recording, at its own gains: {outcome}; {mode}"),
         (outcome, None) => format!("in the recording, at its own gains: {outcome}"),
     }

@@ -35,7 +35,7 @@ impl Answer {
         if let Some(Outcome::Unstable { growth_per_s }) = recorded_outcome {
             warnings.push(Warning::RecordingGrows { growth_per_s });
             frequency.cannot_tell = Some(CannotTell {
-                reason: "the recording itself runs away, so it holds no steady response".to_string(),
+                reason: "the recording itself diverges, so it contains no steady response".to_string(),
                 advice: Some("record at a lower gain, or with a smaller dither".to_string()),
             });
         }
@@ -43,8 +43,8 @@ impl Answer {
         if let Some(law) = [question.asked, question.recorded].into_iter().flatten().find_map(coupling_law) {
             frequency.cannot_tell = Some(CannotTell {
                 reason: format!(
-                    "the loop goes through a coupling of the law {law}: the force on the master is not lambda times the contact force, so \
-                     the loop measured at one gain says nothing of another"
+                    "the coupling law is {law}: the force on the master is not lambda times the contact force, so a loop measured at one \
+                     gain does not predict another"
                 ),
                 advice: None,
             });
@@ -117,15 +117,23 @@ impl Answer {
             _ if measured => self.by_frequency(),
             (Some(again), true) => {
                 let why = again.outcome.to_string();
-                self.untold(&format!("when the loop is run again {why}; and the recording holds no excitation that tells the loop"));
+                self.untold(&format!(
+                    "in the re-simulation {why}; and the recording contains no excitation from which the loop can be \
+                    identified"
+                ));
             }
-            (Some(_), false) if agree => {
-                self.untold("nothing in the recording says whether its models are right, and it holds no excitation that tells the loop")
-            }
-            (Some(_), false) => {
-                self.untold("the models in the bag do not do what was recorded, and it holds no excitation that tells the loop")
-            }
-            _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
+            (Some(_), false) if agree => self.untold(
+                "the recording does not show whether its models are right, and it contains no excitation from which the loop \
+                    can be identified",
+            ),
+            (Some(_), false) => self.untold(
+                "the models in the bag do not reproduce the recording, and it contains no excitation from which the loop can \
+                    be identified",
+            ),
+            _ => self.untold(
+                "there is no loop to re-simulate, and the recording contains no excitation from which the loop can be \
+                identified",
+            ),
         }
         if !self.least_favourable() {
             self.name_the_edge();
@@ -146,7 +154,7 @@ impl Answer {
         let Some(again) = &self.resimulated else { return };
         self.from = Method::Resimulation;
         self.verdict = Word::of(&again.outcome);
-        self.reason = format!("{} when the loop is run again with {}", again.outcome, again.script);
+        self.reason = format!("{} in the re-simulation with {}", again.outcome, again.script);
         let edge = &again.edge;
         match edge.critical_gain {
             Some(critical) => {
@@ -173,12 +181,12 @@ impl Answer {
         (self.critical_gain, self.at_least) = (answer.critical_gain, answer.at_least);
         (self.critical_gain_ci95, self.critical_frequency_hz) = (answer.critical_gain_ci95, answer.frequency_hz);
         if frequency.amplitude_dependent {
-            self.reason += "; the edge depends on the amplitude, so it is an interval over those measured";
+            self.reason += "; the limit depends on the amplitude, so it is an interval over the measured amplitudes";
         }
         // A clamp limits whatever the model lacks.
         if let (Word::Stable, Some(Outcome::Limited { .. })) = (self.verdict, self.resimulated.as_ref().map(|r| r.outcome)) {
             self.verdict = Word::Limited;
-            self.reason += "; when the loop is run again a clamp acts or the travel is left, which is never stable";
+            self.reason += "; in the re-simulation a clamp acts or the master leaves its travel, which is never called stable";
         }
     }
 
@@ -198,7 +206,7 @@ impl Answer {
             return;
         }
         self.verdict = Word::CannotTell;
-        self.reason = format!("the recording does not allow a green answer: {why}; of what there is: {}", self.reason);
+        self.reason = format!("the recording does not allow the answer \"stable\": {why}; from the available data: {}", self.reason);
         self.held_back = Some(why);
     }
 
@@ -211,7 +219,7 @@ impl Answer {
             return;
         };
         if self.verdict == Word::Stable || self.verdict == Word::CannotTell {
-            self.reason = format!("at this very gain the recording itself shows: {outcome}; otherwise {}", self.reason);
+            self.reason = format!("at this gain the recording itself shows: {outcome}; otherwise {}", self.reason);
             (self.verdict, self.from) = (Word::of(&outcome), Method::Recording);
         }
     }

@@ -13,13 +13,15 @@ impl Answer {
         for check in self.checks.iter().filter(|c| !c.agrees) {
             found.push(Disagreement {
                 kind: Apart::Model,
-                text: format!("{check}: the model leaves something out or its numbers are wrong"),
+                text: format!("{check}: an effect is missing from the model, or its parameters are wrong"),
             });
         }
         if let Some(check) = self.loop_check.filter(|c| !c.agrees) {
             let (is, explained) = (100.0 * check.difference, 100.0 * check.noise);
-            let text =
-                format!("near the edge the measured loop is {is:.1} % off the loop that the models make ({explained:.1} % would be noise)");
+            let text = format!(
+                "near the stability limit the measured loop differs by {is:.1} % from the loop of the models ({explained:.1} % is \
+                    explained by noise)"
+            );
             found.push(Disagreement { kind: Apart::Model, text });
         }
         if let (Some(answer), Some(again)) = (&self.frequency_answer, &self.resimulated) {
@@ -27,14 +29,14 @@ impl Answer {
             if verdicts_differ(answer, &again.outcome) {
                 let says = if answer.verdict == frequency::Verdict::Stable { "stable" } else { "unstable" };
                 methods(format!(
-                    "at mu*lambda = {:.3} the frequency response says {says}, the re-simulation {}",
+                    "at mu*lambda = {:.3} the frequency response gives {says}, the re-simulation {}",
                     answer.gain, again.outcome
                 ));
             }
             if edges_lie_apart(answer, &again.edge) {
                 let model_is_off = self.checks.iter().any(|c| !c.agrees) || self.loop_check.is_some_and(|c| !c.agrees);
                 methods(format!(
-                    "the edge is {} by the frequency response and {} by the re-simulation: act on the lower. {}",
+                    "the stability limit is {} by the frequency response and {} by the re-simulation: use the lower. {}",
                     edge_in_words(answer.critical_gain, answer.at_least),
                     edge_in_words(again.edge.critical_gain, Some(again.edge.at_least)),
                     why_apart(swapped, answer.amplitude_dependent, model_is_off)
@@ -80,14 +82,15 @@ fn edge_in_words(gain: Option<f64>, least: Option<f64>) -> String {
 /// Why the measured response and the re-simulation may give different stability limits.
 fn why_apart(swapped: Swapped, amplitude_dependent: bool, model_is_off: bool) -> &'static str {
     match () {
-        () if model_is_off => {
-            "The models do not do what was recorded, so that the re-simulation lacks something that the measured loop has"
+        () if model_is_off => "The models do not reproduce the recording, so the re-simulation lacks an effect of the measured loop",
+        () if amplitude_dependent => {
+            "The measured limit depends on the amplitude of the dither: such a loop has a different limit for \
+            each motion"
         }
-        () if amplitude_dependent => "The measured edge depends on the amplitude of the dither: such a loop has an edge for each motion",
-        () if swapped.any() => "The exchanged parts enter the frequency response linearised, and the re-simulation as they are",
+        () if swapped.any() => "The exchanged parts are linearised in the frequency response, and nonlinear in the re-simulation",
         () => {
-            "The frequency response is that of the dither's small motion in contact; the re-simulation goes through the hand's whole motion, in which \
-             friction, hysteresis and touching differ"
+            "The frequency response is measured with the dither's small motion in contact; the re-simulation covers the whole motion of \
+             the hand, where friction, hysteresis and contact differ"
         }
     }
 }

@@ -29,7 +29,7 @@ fn rank(word: Word) -> u8 {
 
 /// A grip in words.
 fn grip_name(scale: f64) -> String {
-    if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as firm") }
+    if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as stiff") }
 }
 
 /// Logarithm of the ratio up to which two stability limits may be one.
@@ -57,10 +57,10 @@ impl Answer {
         let Some(again) = again else {
             return measured.into_iter().filter(|_| self.from == Method::Frequency).collect();
         };
-        let mut all = vec![Witness::of_run(format!("the loop run again with {}", grip_name(1.0)), 1.0, &again.outcome, &again.edge)];
+        let mut all = vec![Witness::of_run(format!("re-simulation with {}", grip_name(1.0)), 1.0, &again.outcome, &again.edge)];
         for grip in &again.grips {
             let Some(at_asked) = &grip.at_asked else { continue };
-            all.push(Witness::of_run(format!("the loop run again with {}", grip_name(grip.scale)), grip.scale, at_asked, &grip.edge));
+            all.push(Witness::of_run(format!("re-simulation with {}", grip_name(grip.scale)), grip.scale, at_asked, &grip.edge));
         }
         // Within their uncertainty they say the same, and the runs know friction and contact besides.
         let highest = self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95).and_then(|ci| ci.1);
@@ -117,8 +117,10 @@ impl Answer {
         let Some((low, Some(high))) = self.critical_gain_ci95 else { return };
         if self.verdict == Word::Stable && asked >= low && asked <= high {
             self.verdict = Word::CannotTell;
-            self.reason =
-                format!("too close to call: the gain lies within the 95 % interval of the edge, {low:.3} to {high:.3}; {}", self.reason);
+            self.reason = format!(
+                "too close to call: the gain lies within the 95 % interval of the stability limit, {low:.3} to {high:.3}; {}",
+                self.reason
+            );
         }
     }
 
@@ -144,15 +146,15 @@ impl Answer {
         }
         if let Some(end) = self.limited_from.filter(|_| leads.name != *by) {
             let other = leads.end().map_or("none".to_string(), |end| format!("{end:.3}"));
-            self.reason += &format!("; the limit to act on is the lowest known, mu*lambda = {end:.3} by {by} ({other} by {})", leads.name);
+            self.reason += &format!("; use the lowest limit, mu*lambda = {end:.3} by {by} ({other} by {})", leads.name);
             return;
         }
         let Some(edge) = self.critical_gain else { return };
         self.reason += &match leads.critical_gain {
             Some(other) if leads.name != *by => {
-                format!("; the edge to act on is the lowest known, mu*lambda = {edge:.3} by {by} ({other:.3} by {})", leads.name)
+                format!("; use the lowest stability limit, mu*lambda = {edge:.3} by {by} ({other:.3} by {})", leads.name)
             }
-            _ => format!("; the edge lies at mu*lambda = {edge:.3}"),
+            _ => format!("; the stability limit is mu*lambda = {edge:.3}"),
         };
     }
 }
@@ -160,22 +162,22 @@ impl Answer {
 /// Why it is not stable, by the witness that found it and the one that leads.
 fn reason(worst: &Witness, asked: f64, leads: Option<&Witness>) -> String {
     let edge = |w: &Witness| match (w.critical_gain, w.end()) {
-        (Some(edge), _) => format!("edge at mu*lambda = {edge:.3}"),
-        (None, Some(end)) => format!("a clamp or the travel from {end:.3} on"),
-        (None, None) => "no edge known".to_string(),
+        (Some(edge), _) => format!("stability limit at mu*lambda = {edge:.3}"),
+        (None, Some(end)) => format!("a clamp or the end of travel from {end:.3} on"),
+        (None, None) => "no stability limit known".to_string(),
     };
     let beyond = worst.verdict == Word::Stable && worst.end().is_some_and(|end| asked >= end);
     let mut text = if beyond {
         format!(
-            "the gain lies beyond the edge by {} ({}): that one run at this very gain looks stable is not to be relied on",
+            "the gain lies above the stability limit by {} ({}): do not rely on one run at this gain that looks stable",
             worst.name,
             edge(worst)
         )
     } else {
-        format!("{} says: {} ({})", worst.name, worst.seen, edge(worst))
+        format!("{}: {} ({})", worst.name, worst.seen, edge(worst))
     };
     if let Some(leads) = leads {
-        text += &format!("; {} says: {} ({}); act on the lower edge", leads.name, leads.seen, edge(leads));
+        text += &format!("; {}: {} ({}); use the lower limit", leads.name, leads.seen, edge(leads));
     }
     text
 }

@@ -116,7 +116,7 @@ fn exchanged(graph: &Graph, swapped: Swapped) -> ExchangedParts<'_> {
 }
 
 fn scenario(question: &Question) -> Result<Scenario, String> {
-    let Some(graph) = question.asked else { return Err("the bag holds no models".to_string()) };
+    let Some(graph) = question.asked else { return Err("the bag contains no models".to_string()) };
     if question.intents.is_none() && question.script.is_none() {
         return Err("the hand's motion was not recorded and could not be recovered; name one with --script".to_string());
     }
@@ -129,12 +129,12 @@ fn scenario(question: &Question) -> Result<Scenario, String> {
 }
 
 fn resimulate(question: &Question, scenario: &Scenario, progress: Progress, cancel: &AtomicBool) -> Result<Resimulated, AnswerError> {
-    progress("the gain asked", 0, 1);
+    progress("the requested gain", 0, 1);
     let keep = RunOptions { keep_signals: true, ..RunOptions::default() };
     let run = scenario.run(question.gain, &keep, cancel)?;
     let signals = run.signals.unwrap_or_else(|| question.session.clone());
     let options = RunOptions::default();
-    let edge = edge(scenario, &question.search, &options, &|done, all| progress("the edge", done, all), cancel)?;
+    let edge = edge(scenario, &question.search, &options, &|done, all| progress("the stability limit", done, all), cancel)?;
     let asked = Some(question.gain.product());
     let others: Vec<f64> = question.grips.iter().copied().filter(|s| *s != 1.0).collect();
     // For other grips the stability limit need not be as exact.

@@ -62,25 +62,29 @@ impl fmt::Display for Warning {
                 f.write_str("the gains of the recording are not known: every gain is in multiples of the recorded one")
             }
             Warning::RecordingGrows { growth_per_s } => {
-                write!(f, "with its dither and at its own gain the recording grows, by {growth_per_s:.2} per second")
+                write!(f, "with its dither and at its own gain the recorded motion grows by {growth_per_s:.2} per second")
             }
             Warning::LoopNotMeasured => {
-                f.write_str("the loop itself was not measured: this is what the models in the bag say, which do what was recorded")
+                f.write_str("the loop itself was not measured: this answer is from the models in the bag, which reproduce the recording")
             }
             Warning::NotWithEveryGrip { gain, fails } => {
                 let fails: Vec<String> = fails.iter().map(|(scale, outcome)| format!("{scale} of the grip: {outcome}")).collect();
-                write!(f, "stable with this grip, but not with every grip at mu*lambda = {gain:.3}: {}", fails.join("; "))
+                write!(f, "stable with this grip, but not with all grips at mu*lambda = {gain:.3}: {}", fails.join("; "))
             }
             Warning::Flickers { lowest, highest } => {
                 write!(f, "from mu*lambda = {lowest:.3} to {highest:.3} the verdict changes with the gain more than once")
             }
             Warning::ReturnsToStable { gain } => {
-                write!(f, "beyond its edge the loop is stable again at mu*lambda = {gain:.3}: do not rely on it")
+                write!(f, "above its stability limit the loop is stable again at mu*lambda = {gain:.3}: do not rely on it")
             }
             Warning::AmplitudeDependent { edges } => {
                 let edges: Vec<String> = edges.iter().map(|(edge, rms)| format!("{edge:.3} at {rms:.3} rms")).collect();
                 let edges = edges.join(", ");
-                write!(f, "the edge depends on the dither's amplitude ({edges}): friction, hysteresis or backlash is in the loop")
+                write!(
+                    f,
+                    "the stability limit depends on the dither's amplitude ({edges}): the loop contains friction, hysteresis or \
+                    backlash"
+                )
             }
         }
     }

@@ -57,7 +57,7 @@ fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_pla
     }
     if wanted.is_empty() {
         let asked = names(signals_of(model).into_iter());
-        return Err(ProblemError::Set(format!("{}: say in [columns] of set.toml which topics hold {asked}", path.display())));
+        return Err(ProblemError::Set(format!("{}: state in [columns] of set.toml which topics hold {asked}", path.display())));
     }
     let hold = |name: &str| model.inputs.iter().find(|i| i.name == name).map_or(Hold::Linear, |i| i.hold);
     Ok(recording_up_to(&reader, Some(&wanted), columns, piece, &hold, MOST_OF_A_BAG)?)

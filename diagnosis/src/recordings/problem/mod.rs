@@ -195,7 +195,7 @@ impl Problem {
             return Ok(self);
         }
         if left.is_empty() {
-            return Err("every output that was recorded is ignored: nothing is left to compare the model with".to_string());
+            return Err("every output that was recorded is ignored: there is no signal to compare the model with".to_string());
         }
         Ok(self.without_outputs(&ignored))
     }

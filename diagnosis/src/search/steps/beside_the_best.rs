@@ -16,7 +16,7 @@ pub(crate) struct BesideTheBest;
 
 impl Step for BesideTheBest {
     fn name(&self) -> &'static str {
-        "screening beside the best"
+        "screening additions to the best"
     }
 
     fn terms(&self) -> Terms {

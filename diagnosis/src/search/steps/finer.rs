@@ -12,7 +12,7 @@ pub(crate) struct Finer;
 
 impl Step for Finer {
     fn name(&self) -> &'static str {
-        "resolving a law more finely"
+        "refining the discretisation of a law"
     }
 
     fn terms(&self) -> Terms {

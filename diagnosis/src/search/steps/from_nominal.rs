@@ -14,7 +14,7 @@ pub(crate) struct FromNominal;
 
 impl Step for FromNominal {
     fn name(&self) -> &'static str {
-        "fitting beside the parameters as given"
+        "fitting with the nominal parameters"
     }
 
     fn terms(&self) -> Terms {

@@ -24,7 +24,7 @@ impl Split {
     /// Beside the nominal model.
     pub const ALONE: Split = Split { name: "splitting joints in two", beside: false };
     /// Beside what was found.
-    pub const BESIDE: Split = Split { name: "splitting joints beside the best", beside: true };
+    pub const BESIDE: Split = Split { name: "splitting joints in addition to the best", beside: true };
 }
 
 impl Step for Split {

@@ -5,7 +5,7 @@ use super::shown::Where;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What only a diagnosis of an arm says.
+/// Additional results of the diagnosis of an arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArmPart {
     /// Corner of the filter that measured torque and every regressor went through, Hz.
@@ -25,13 +25,13 @@ pub struct ArmJoint {
     pub joint: String,
     /// Root mean square of the measured torque, N m or N.
     pub torque_rms: f64,
-    /// By the nominal model as it was given.
+    /// By the nominal model as given.
     pub as_given: f64,
     /// With its parameters refitted.
     pub refit: f64,
     /// By the diagnosed model.
     pub diagnosed: f64,
-    /// Of a simulation in closed loop that is fed the measured torque: the torque that the loop had to add to keep the measured motion, as a share of the
+    /// Closed-loop simulation with the measured torque: the torque that the controller added to keep the measured motion, as a share of the
     /// rms torque, by the refitted nominal model; null where it cannot be simulated.
     pub loop_refit: Option<f64>,
     /// The same by the diagnosed model.
@@ -47,7 +47,7 @@ pub struct ArmJoint {
     pub shows: Option<Where>,
 }
 
-/// A combination of inertial parameters: one of them and what always goes with it.
+/// A base parameter: an inertial parameter and those that always appear with it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseParameter {
     /// Such as `Iyy2 + 0.09 m3`: `m`, `mx`, `Ixx`, ... with the number of the joint; of mass times centre and inertia about the joint's frame.

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A physics that was left out. It has `between` (two bodies, or a body and `ground`) or `signal` (an input or an output).
+/// An effect that the model leaves out. It has `between` (two bodies, or a body and `ground`) or `signal` (an input or an output).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
     /// Its name: an element kind of model files, a key of an input or output (`delay`, `bandwidth`, `saturation`, `gain`, `back_emf`, `offset`),
@@ -45,7 +45,7 @@ impl Finding {
     }
 }
 
-/// Another explanation in the place of a finding. It has `between` or `signal`, as a finding.
+/// An alternative explanation of a finding. It has `between` or `signal`, as a finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Alternative {
     /// Its name, as that of a finding.
@@ -111,8 +111,8 @@ pub struct Moved {
     pub moved_sd: Option<f64>,
 }
 
-/// The smallest size of a physics that the recordings would have shown. Beside `physics`, `between` or `signal` and `unit` it has one more key:
-/// the parameter that says how large the physics is, with that size in `unit`.
+/// The smallest size of an effect that the recordings would have shown. Besides `physics`, `between` or `signal` and `unit` it has one more key:
+/// the parameter of the size of the effect, with its value in `unit`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Detectable {
     /// Its name, as that of a finding.

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 /// Version of the verdict file that is written. It changes when a key changes its meaning, not when one is added.
 pub const SCHEMA: u32 = 1;
 
-/// What a diagnosis says about a model and its recordings: one JSON file. SI units throughout.
+/// The result of a diagnosis: one JSON file. All values are in SI units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Verdict {
     /// Version of the format, 1. It changes when a key changes its meaning, not when one is added.
@@ -64,7 +64,7 @@ pub struct Verdict {
     /// Files of models of other explanations whose residual is little larger, beside the verdict, the nearest first.
     #[serde(default)]
     pub rival_models: Vec<String>,
-    /// What to record next: what tells rivals apart, confirms what remains, or determines what is not well known yet; or why no recording would help.
+    /// What to record next: it separates rivals, confirms the findings, or determines uncertain parameters; or the reason why no recording would help.
     /// Null in files of versions that planned one for `ambiguous` and `cannot_tell` only.
     pub next_experiment: Option<NextExperiment>,
     /// Where nothing was added to the model: for each physics the smallest size that the recordings would have shown, at the place where it
@@ -73,10 +73,10 @@ pub struct Verdict {
     /// How far the search went; null in files of versions that did not say.
     #[serde(default)]
     pub searched: Option<Searched>,
-    /// What only a diagnosis of an arm says; not in other files.
+    /// Additional results of the diagnosis of an arm; not in other files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<Box<ArmPart>>,
-    /// What only a diagnosis from commands and positions says; not in other files.
+    /// Additional results of a diagnosis from commands and positions; not in other files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub servo: Option<Box<ServoPart>>,
 }
@@ -102,12 +102,12 @@ pub enum Word {
     Parameters,
     /// The model explains the recordings down to the sensors' noise.
     NothingMissing,
-    /// Something is missing and no known physics explains it; `where` still says where it shows.
+    /// An effect is missing and no known effect explains it; `where` still states where it appears.
     Unexplained,
-    /// Two or more explanations fit alike, and `next_experiment` tells them apart, in simulation, each refitted to it; `findings[0].alternatives` lists them.
+    /// Two or more explanations fit equally well, and `next_experiment` separates them in simulation; `findings[0].alternatives` lists them.
     Ambiguous,
-    /// The recordings do not excite what would be needed to say, and `next_experiment` says what would; or explanations of different kind or place fit alike that no
-    /// experiment within the range of the recordings tells apart, and it says why.
+    /// The excitation is not sufficient for an answer, and `next_experiment` is sufficient; or explanations of different kind or place fit equally well,
+    /// no experiment within the range of the recordings separates them, and it states why.
     CannotTell,
 }
 
@@ -153,7 +153,7 @@ pub struct Remaining {
     pub share: Option<f64>,
     /// What the sensors' noise alone would be of that residual, at least 0.
     pub floor_share: Option<f64>,
-    /// What is left over on the fitted recordings, in standard deviations of the sensor noise: 1 cannot be improved on.
+    /// Residual on the fitted recordings, in standard deviations of the sensor noise: 1 cannot be reduced further.
     pub noise_sd: Option<f64>,
     /// What the device does not repeat where it was repeated (recordings of one excitation, periods), in standard deviations of the sensor noise, the
     /// largest of the outputs: no model can do better. Null where nothing was repeated.
@@ -170,7 +170,7 @@ pub struct Remaining {
 /// averaged over all pairs of recording and output. Null where a model cannot be simulated.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
-    /// Of the nominal model as it was given.
+    /// Of the nominal model as given.
     pub nrmse_before: Option<f64>,
     /// Of the nominal structure with its parameters refitted.
     pub nrmse_refit: Option<f64>,
@@ -178,7 +178,7 @@ pub struct HeldOut {
     pub nrmse_after: Option<f64>,
     /// What the sensors' noise alone would leave.
     pub noise_floor: Option<f64>,
-    /// The same of the nominal model as it was given, by output: the root of the summed squared errors over that of the summed squared deviations
+    /// The same of the nominal model as given, by output: the root of the summed squared errors over that of the summed squared deviations
     /// from each recording's mean, all recordings together.
     pub pooled_before: Option<BTreeMap<String, f64>>,
     /// As `pooled_before`, of the nominal structure with its parameters refitted.
@@ -199,7 +199,7 @@ pub struct RecordErrors {
     pub record: String,
     /// The output.
     pub output: String,
-    /// Of the nominal model as it was given.
+    /// Of the nominal model as given.
     pub nrmse_before: Option<f64>,
     /// Of the nominal structure with its parameters refitted.
     pub nrmse_refit: Option<f64>,

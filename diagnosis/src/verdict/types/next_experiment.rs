@@ -42,7 +42,7 @@ pub struct Planned {
     pub excitation: String,
     /// What to play, and what would be seen.
     pub sentence: String,
-    /// What it tells apart, or the parameters that it determines.
+    /// The explanations that it separates, or the parameters that it determines.
     pub between: Vec<String>,
     /// How far apart it brings the two explanations that it separates least, each refitted to it, in standard deviations.
     pub separation_sd: Option<f64>,
@@ -56,7 +56,7 @@ pub struct Planned {
     pub duration_s: Option<f64>,
     /// Sampling rate that it was planned for, Hz.
     pub rate_hz: f64,
-    /// A sensor that has to be added for it: no excitation tells with those that are there. Not in files where those there are do.
+    /// A sensor that must be added, because no excitation is sufficient with the present ones. Absent if none is needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Box<Sensor>>,
     /// A known mass that an arm has to carry for it. Only in files where one is asked for.

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What only a diagnosis from commands and positions says.
+/// Additional results of a diagnosis from commands and positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ServoPart {
     /// Each joint, in the order of the set.
@@ -23,9 +23,9 @@ pub struct ServoAnswer {
     pub errors: ServoErrors,
     /// Numbers of the diagnosed joint, by their keys in the model file; forces over the proportional gain.
     pub numbers: BTreeMap<String, Estimate>,
-    /// Proportional gain, N m/rad, where gravity with the masses of the robot file tells it; null where nothing does.
+    /// Proportional gain, N m/rad, if gravity and the masses of the robot file determine it; otherwise null.
     pub gain: Option<Estimate>,
-    /// What cannot be told apart at this joint.
+    /// Effects that cannot be separated at this joint.
     #[serde(default)]
     pub shared: Vec<SharedCause>,
 }
@@ -36,7 +36,7 @@ pub struct ServoAnswer {
 pub struct ServoErrors {
     /// Of the command itself taken for the position.
     pub command: Option<f64>,
-    /// Of the model as it was given, or of a delay, a second order and an offset.
+    /// Of the model as given, or of a delay, a second order and an offset.
     pub refit: Option<f64>,
     /// Of the diagnosed joint.
     pub diagnosed: Option<f64>,

@@ -55,9 +55,9 @@ fn a_class_that_is_null_stays_in_the_file() {
 
 #[test]
 fn the_next_experiment_is_an_excitation_or_a_reason() {
-    let refused = r#"{"sentence":"no excitation tells them apart"}"#;
+    let refused = r#"{"sentence":"no excitation separates them"}"#;
     let read: NextExperiment = serde_json::from_str(refused).unwrap();
-    assert_eq!((read.sentence(), read.file()), ("no excitation tells them apart", None));
+    assert_eq!((read.sentence(), read.file()), ("no excitation separates them", None));
     assert_eq!(serde_json::to_string(&read).unwrap(), refused);
     let planned = r#"{"file":"next-experiment.toml","input":"u","excitation":"sine","sentence":"Play it.","between":["a","b"],
         "separation_sd":7.1,"level_floors":2.0,"output":"y","repeats":3,"duration_s":2.0,"rate_hz":1000.0}"#;

@@ -17,7 +17,7 @@ pub(super) fn read_gains(top: &mut Table) -> Result<GainPlan, FileError> {
     for mut change in gains.tables("change")? {
         let at_s = change.need_number("at_s", Range::NonNegative)?;
         if at_s < last {
-            return Err(change.error_at("at_s", "changes must stand in order of time"));
+            return Err(change.error_at("at_s", "changes must be in order of time"));
         }
         mu = change.number_or("mu", Range::NonNegative, mu)?;
         lambda = change.number_or("lambda", Range::NonNegative, lambda)?;

@@ -124,7 +124,7 @@ impl NodeReader<'_> {
         let unused = range.as_ref().map(|_| "hand_range").or(edge_without.map(|_| "edge_without"));
         let hand = match (estimated, unused) {
             (false, None) => None,
-            (false, Some(key)) => return Err(table.error_at(key, "means nothing without hand = \"estimated\"")),
+            (false, Some(key)) => return Err(table.error_at(key, "has no effect without hand = \"estimated\"")),
             (true, _) => Some(HandSettings { edge_without, ..hand_settings(table, range.as_deref())? }),
         };
         if hand.is_some_and(|hand| hand.edge_without.is_none()) && names.len() > 1 {
@@ -132,9 +132,9 @@ impl NodeReader<'_> {
             return Err(table.error_at(
                 "hand",
                 format!(
-                    "\"estimated\" over {} coupled axes needs edge_without (--edge-without MU_LAMBDA): without it the canceller can shake a loop \
-                     that is stable with nothing cancelled. It is the gain up to which this graph is stable with --canceller none; \
-                     `backdrive stability` on a bag of such a run gives it. Or leave hand = \"estimated\" (--hand estimated) out",
+                    "\"estimated\" over {} coupled axes needs edge_without (--edge-without MU_LAMBDA): without it the canceller can make \
+                     a stable loop oscillate. It is the gain up to which this graph is stable with --canceller none; `backdrive \
+                     stability` on a bag of such a run gives it. Or omit hand = \"estimated\" (--hand estimated)",
                     names.len()
                 ),
             ));

@@ -21,7 +21,7 @@ pub struct Network {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
     /// No such domain.
-    #[error("{from} = `{given}` is no domain: expected a whole number from 0 to {MAX_DOMAIN}")]
+    #[error("{from} = `{given}` is not a domain: expected a whole number from 0 to {MAX_DOMAIN}")]
     Domain {
         /// Its source, such as `ROS_DOMAIN_ID`.
         from: &'static str,

@@ -77,11 +77,11 @@ fn who(from: Option<GUID>, why: Why) -> String {
     });
     let gid = gid.unwrap_or_default();
     match why {
-        Why::Unknown(run) => format!("run {run} speaks here too"),
-        Why::Untagged => format!("a stranger speaks here{gid}"),
+        Why::Unknown(run) => format!("run {run} sends on this topic too"),
+        Why::Untagged => format!("a program outside the run sends on this topic{gid}"),
         Why::Forged => format!("a stranger forges tags{gid}"),
         Why::Replayed => format!("a stranger plays a recording{gid}"),
-        Why::Unreadable => "a stranger speaks here, in an unknown encoding".to_string(),
+        Why::Unreadable => "a program outside the run sends on this topic, in an unknown encoding".to_string(),
     }
 }
 
@@ -101,7 +101,10 @@ mod tests {
             refusals.add(Some(GUID::from_bytes([1; 16])), Why::Untagged, false);
         }
         let told = refusals.complaint(&topic()).unwrap().to_string();
-        assert!(told.contains("/master/servo_jf: a stranger speaks here (GID 01.01.") && told.contains("refused: 3"), "{told}");
+        assert!(
+            told.contains("/master/servo_jf: a program outside the run sends on this topic (GID 01.01.") && told.contains("refused: 3"),
+            "{told}"
+        );
         assert!(told.len() <= 128, "{} bytes: {told}", told.len());
         refusals.add(None, Why::Replayed, false);
         assert!(refusals.complaint(&topic()).is_none());
@@ -119,7 +122,7 @@ mod tests {
         refusals.unknown = refusals.unknown.and_then(|(run, since)| Some((run, since.checked_sub(BEGINS)?)));
         refusals.add(None, unknown, true);
         let told = refusals.complaint(&topic()).unwrap().to_string();
-        assert!(told.contains("run 6925b1f2001a2b3c4d5e speaks here too"), "{told}");
+        assert!(told.contains("run 6925b1f2001a2b3c4d5e sends on this topic too"), "{told}");
         // Somebody else is, at once.
         let mut refusals = Refusals::default();
         refusals.add(None, unknown, true);

@@ -20,7 +20,7 @@ pub(super) fn read(section: Element, compiler: &Compiler, defaults: &Defaults, f
             continue;
         };
         let Some(gain) = gain(&of)? else {
-            let message = "not read: it is a controller or has a dynamics of its own; what drives a joint is an input of the model file";
+            let message = "not read: it is a controller or has its own dynamics; the drive of a joint is an input of the model file";
             found.remarks.add(about, element.line(), message, true);
             continue;
         };
@@ -41,7 +41,7 @@ pub(super) fn read(section: Element, compiler: &Compiler, defaults: &Defaults, f
         let force = largest(&of, "forcelimited", "forcerange", compiler)?;
         let command = largest(&of, "ctrllimited", "ctrlrange", compiler)?;
         if [force, command].into_iter().flatten().any(|(low, high)| -low != high) {
-            let message = "its limits are not alike in both directions; the wider one is taken for both";
+            let message = "its limits differ by direction; the wider one is used for both";
             found.remarks.add(about, element.line(), message, true);
         }
         let widest = |range: Option<(f64, f64)>| range.map_or(f64::INFINITY, |(low, high)| low.abs().max(high.abs()));

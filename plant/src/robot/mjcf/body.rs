@@ -48,7 +48,7 @@ pub(super) fn world<'a>(section: Element<'a>, compiler: &Compiler, defaults: &De
         bodies.map(|(element, frame, class)| Open { element: *element, parent, frame: *frame, class: *class, moving, depth }).collect()
     };
     if let Some((joint, ..)) = held.iter().find(|(element, ..)| matches!(element.tag(), "joint" | "freejoint")) {
-        return Err(joint.error("stands in <worldbody>, which does not move; put it into a <body>"));
+        return Err(joint.error("is in <worldbody>, which does not move; put it into a <body>"));
     }
     open.extend(within(&held, 0, false, 1));
     while let Some(body) = open.pop() {
@@ -171,7 +171,7 @@ impl<'a> Around<'a, '_> {
         let mass = element.need_number("mass", Range::NonNegative)?;
         let centre = element.need_attribute("pos").and_then(|text| element.as_array::<3>("pos", text))?;
         let own = match (of.array::<3>("diaginertia")?, of.array::<6>("fullinertia")?) {
-            (Some(_), Some(_)) => return Err(element.error("says both diaginertia and fullinertia; expected one of them")),
+            (Some(_), Some(_)) => return Err(element.error("has both diaginertia and fullinertia; expected one of them")),
             (Some(moments), None) => Matrix3::from_diagonal(&Vector3::from(moments)),
             (None, Some([xx, yy, zz, xy, xz, yz])) => Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
             (None, None) => return Err(element.error("has no inertia: give diaginertia or fullinertia, kg m²")),

@@ -68,7 +68,7 @@ fn first(of: &Styled, name: &str, remarks: &mut Remarks) -> Result<f64, FileErro
         return Err(of.element.error_at(name, format!("must be at least 0, is {linear}")));
     }
     if numbers.iter().skip(1).any(|n| *n != 0.0) {
-        let message = "only the first number is read; what is not in proportion can be an element of the joint's network";
+        let message = "only the first number is read; a nonlinear part can be an element of the joint's network";
         remarks.add(format!("<joint {name}>"), of.element.line(), message, true);
     }
     Ok(linear)

@@ -72,8 +72,8 @@ fn left_aside(section: Element, remarks: &mut Remarks) -> Result<(), FileError> 
         "equality" => {
             let acting = section.children().find(|e| e.attribute("active") != Some("false"));
             if let Some(equality) = acting {
-                let message = "ties bodies or joints to each other, which a tree cannot: take it out, or give it active=\"false\"; a stiff spring between two \
-                               joints in the model file can tie them";
+                let message = "ties bodies or joints to each other, which a tree cannot represent. Remove it, or give it \
+                               active=\"false\"; a stiff spring between two joints in the model file can tie them";
                 return Err(equality.error(message));
             }
             return Ok(());
@@ -83,7 +83,7 @@ fn left_aside(section: Element, remarks: &mut Remarks) -> Result<(), FileError> 
         "contact" => ("contacts between bodies are not computed", true),
         "deformable" => ("what bends is not computed", true),
         "asset" | "visual" | "statistic" | "size" | "custom" | "keyframe" => ("not read: it does not move", false),
-        "sensor" => ("not read: what is measured is an output of the model file", false),
+        "sensor" => ("ignored: measured signals are outputs of the model file", false),
         "extension" => ("plugins are not read", true),
         _ => ("not known, and not read", true),
     };

@@ -21,7 +21,7 @@ pub(super) fn rotation(of: &Styled, compiler: &Compiler) -> Result<Matrix3<f64>,
     // An orientation of the element itself precedes one of its class in another notation.
     let own: Vec<&str> = WAYS.into_iter().filter(|way| of.element.attribute(way).is_some()).collect();
     if let [first, second, ..] = own.as_slice() {
-        return Err(of.element.error(format!("says both {first} and {second}; expected one way to say how it is turned")));
+        return Err(of.element.error(format!("has both {first} and {second}; expected one way to state its orientation")));
     }
     let Some(way) = own.first().copied().or_else(|| WAYS.into_iter().find(|way| of.text(way).is_some())) else {
         return Ok(Matrix3::identity());

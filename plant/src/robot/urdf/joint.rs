@@ -32,8 +32,8 @@ pub(super) fn read(element: Element, robot: &Robot, remarks: &mut Remarks) -> Re
     if let Some(mimic) = element.child("mimic")? {
         let leader = mimic.attribute("joint").unwrap_or("another");
         let message = format!(
-            "ties this joint to joint \"{leader}\", which a tree cannot; take <mimic> out to let it move by itself (a stiff spring between the two joints in the \
-             model file can tie them), or make its type \"fixed\""
+            "ties this joint to joint \"{leader}\", which a tree cannot represent. Remove <mimic> to let it move independently (a stiff \
+             spring between the two joints in the model file can tie them), or make its type \"fixed\""
         );
         return Err(mimic.error(message));
     }

@@ -49,8 +49,8 @@ pub(super) fn read(root: Element) -> Result<Found, FileError> {
             "link" | "joint" => continue,
             "material" => ("colours do not move", false),
             "transmission" => ("not read: motors and gears are the network of a joint in the model file", true),
-            "gazebo" => ("not read: it speaks to a simulator of its own", true),
-            "sensor" => ("not read: what is measured is an output of the model file", false),
+            "gazebo" => ("ignored: it is for one particular simulator", true),
+            "sensor" => ("ignored: measured signals are outputs of the model file", false),
             _ => ("not known, and not read", true),
         };
         found.remarks.add(format!("<{}>", element.tag()), element.line(), message, matters);
