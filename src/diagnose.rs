@@ -10,8 +10,8 @@ use crate::output;
 use crate::progress;
 use answer::{Answer, to_do};
 use backdrive_diagnosis::diagnose::{self, Diagnosis};
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::physics::physics_named;
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
 use backdrive_pages::diagnose::{Shown, page};
 use backdrive_sets::open;
@@ -51,13 +51,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
-    let usual = Settings::default();
-    let settings = Settings {
-        without: of_one_axis(&options.without)?,
-        effects: options.effects.map_or(usual.effects, usize::from),
-        effort: options.effort.unwrap_or(usual.effort),
-        patience: options.patience.map_or(usual.patience, Duration::from_secs_f64),
-    };
+    let settings = Options { without: of_one_axis(&options.without)?, ..asked(options) };
     let Diagnosed { found, written, steps } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
@@ -78,6 +72,17 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     Ok(exit_code(found.verdict.word))
 }
 
+/// What the command line asks of the search.
+fn asked(options: &cli::Diagnose) -> Options {
+    Options {
+        without: options.without.clone(),
+        effects: options.effects.map(usize::from),
+        effort: options.effort,
+        patience: options.patience.map(Duration::from_secs_f64),
+        corner_hz: None,
+    }
+}
+
 /// A diagnosis, and the files that were written of it.
 pub struct Diagnosed {
     /// Everything that was found.
@@ -95,7 +100,7 @@ pub struct Diagnosed {
 /// When the folder cannot be written, or the nominal model cannot be simulated on the recordings.
 pub fn diagnose_into(
     opened: Opened,
-    settings: &Settings,
+    settings: &Options,
     out: &Path,
     report: Option<&Path>,
     stop: &AtomicBool,

@@ -25,6 +25,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> S
     };
     let joints: Vec<String> = servo.joints.iter().filter_map(|j| of(&j.joint)).collect();
     match word {
+        Word::CannotTell => "the search was cut short before it found what delay, second order and offset leave out".to_string(),
         Word::NothingMissing => "delay, second order and offset explain how every joint answers its commands".to_string(),
         Word::Unexplained => {
             "delay, second order and offset do not explain how the joints answer, and no known physics explains more".to_string()

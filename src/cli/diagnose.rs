@@ -51,7 +51,8 @@ pub struct Diagnose {
     /// on every machine. Of an arm everything is tried whatever this says.
     #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
     pub effort: Option<f64>,
-    /// A limit on the clock; without this 600 s. Where it cuts the search off, the verdict may depend on the machine, and says so. Not for an arm.
+    /// A limit on the clock; without this 600 s, and none for an arm and for servo joints. Where it cuts the search off, the verdict may depend on the
+    /// machine, and says so.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub patience: Option<f64>,
     /// Print what the search tried, what it cost and why it lost.

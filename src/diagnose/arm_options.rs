@@ -37,9 +37,6 @@ pub fn notes(options: &cli::Diagnose, set: &RecordingSet) -> Result<Vec<String>,
     if options.effort.is_some() {
         out.push("--effort does nothing for an arm: every physics is tried at every joint, and the search ends by itself".to_string());
     }
-    if options.patience.is_some() {
-        out.push("--patience does nothing for an arm: its search has no clock, and is not cut off".to_string());
-    }
     for name in &options.ignore_signal {
         out.push(format!("--ignore-signal {name} does nothing for an arm: of its logs only the columns of its joints are read"));
     }
@@ -60,15 +57,4 @@ pub fn notes(options: &cli::Diagnose, set: &RecordingSet) -> Result<Vec<String>,
         out.push(format!("{}, mixed_rates: does nothing for an arm: all its logs are laid on the grid of the slowest", file.display()));
     }
     Ok(out)
-}
-
-/// Physics that are not to be considered, with those that contain them as a special case.
-pub fn without(options: &cli::Diagnose) -> Vec<String> {
-    let mut out = options.without.clone();
-    let has = |name: &str| options.without.iter().any(|w| w == name);
-    if has("coulomb") {
-        // Both are dry friction of one level in a limit of their shape: no displacement, or far higher speeds than occur.
-        out.extend(["dahl", "stribeck"].map(str::to_string));
-    }
-    out
 }

@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
@@ -17,6 +18,7 @@ use backdrive_servo::sentences::words;
 use backdrive_sets::{checks, open};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is reported there.
@@ -52,8 +54,9 @@ pub fn diagnose(
     // What cannot be written is reported before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
+    let stop = interrupt::heard()?;
     let problem = Problem::open(set, model).map_err(Failure::input)?;
-    let found = progress::busy("diagnosing the servo joints", || diagnosed(&problem, &options.without)).map_err(Failure::input)?;
+    let found = progress::stages(|report| diagnosed(&problem, &super::asked(options), Some(&stop), report)).map_err(Failure::input)?;
     let write = |name: &str, text: &str| output::file(&options.out.join(name), text);
     let json = serde_json::to_string_pretty(&found.verdict).map_err(Failure::input)?;
     write(VERDICT_FILE, &format!("{json}\n"))?;
@@ -74,6 +77,9 @@ pub fn diagnose(
             output::line(format_args!("\n{}\n", explained(&problem, &found)))?;
         }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
+    }
+    if stop.load(Ordering::SeqCst) {
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
     }
     Ok(found.verdict.word)
 }

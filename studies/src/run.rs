@@ -5,10 +5,10 @@ use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
 use backdrive_diagnosis::audit::{Remark, audit};
 use backdrive_diagnosis::belief::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
 use backdrive_sets::open;
@@ -42,13 +42,13 @@ pub struct Ask<'a> {
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let (out, set) = placed(context, ask)?;
     let opened = open::open(std::slice::from_ref(&set), None, None, &[]).map_err(backdrive::failure::Failure::from)?;
-    let settings = Settings {
+    let options = Options {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
-        effects: ask.effects,
-        effort: ask.effort * context.longer,
-        ..Settings::default()
+        effects: Some(ask.effects),
+        effort: Some(ask.effort * context.longer),
+        ..Options::default()
     };
-    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
+    let Diagnosed { found, .. } = diagnose_into(opened, &options, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
     Ok(found)
 }
 
