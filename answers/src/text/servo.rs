@@ -1,0 +1,112 @@
+//! What a diagnosis of servo joints prints.
+
+use crate::estimate::estimate;
+use backdrive_diagnosis::verdict::words as said;
+use backdrive_diagnosis::verdict::{Finding, Parameter};
+use backdrive_report::number;
+use backdrive_servo::diagnose::Found;
+use backdrive_servo::problem::Problem;
+use backdrive_servo::sentences::words;
+use std::fmt::Write as _;
+
+/// What was found, for a terminal.
+pub(crate) fn text(problem: &Problem, found: &Found) -> String {
+    let mut out = String::new();
+    let mut line = |name: &str, text: String| {
+        let _ = writeln!(out, "{name:<9} {text}");
+    };
+    let verdict = &found.verdict;
+    let held = problem.joints.first().map_or(0, |j| j.held_out.len());
+    let all = problem.joints.first().map_or(0, |j| j.fit.len()) + held;
+    line("logs", format!("{all}, {held} of them held out; commands and positions of {} joints, no torque", problem.joints.len()));
+    for remark in &verdict.audit {
+        line("", format!("{}: {}", remark.place, remark.message));
+    }
+    line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
+    for finding in &verdict.findings {
+        line("found", finding_text(finding));
+        let others: Vec<String> =
+            finding.alternatives.iter().take(3).map(|a| format!("{} ({})", words(&a.physics), said::share(a.confidence))).collect();
+        if !others.is_empty() {
+            line("", format!("or instead {}", others.join(", ")));
+        }
+    }
+    let Some(servo) = &verdict.servo else { return out };
+    for joint in &servo.joints {
+        let e = &joint.errors;
+        let share = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{x:.3}"));
+        line(
+            &joint.joint,
+            format!(
+                "free run from the command: nrmse {} diagnosed, {} with delay and second order, {} of the command itself; mean error {} mrad diagnosed, {} and {}",
+                share(e.diagnosed),
+                share(e.refit),
+                share(e.command),
+                number(1e3 * e.diagnosed_mae),
+                number(1e3 * e.refit_mae),
+                number(1e3 * e.command_mae)
+            ),
+        );
+        if let Some(gain) = &joint.gain {
+            line("", format!("proportional gain {}", estimate(gain)));
+        }
+    }
+    line("scale", servo.scale.clone());
+    let mut told: Vec<&str> = Vec::new();
+    for shared in servo.joints.iter().flat_map(|j| &j.shared) {
+        if !told.contains(&shared.sentence.as_str()) {
+            told.push(&shared.sentence);
+            let joints: Vec<&str> =
+                servo.joints.iter().filter(|j| j.shared.iter().any(|s| s.sentence == shared.sentence)).map(|j| j.joint.as_str()).collect();
+            line("open", format!("{}: {}; to tell them apart, {}", joints.join(", "), shared.sentence, shared.separated_by));
+        }
+    }
+    for note in &found.notes {
+        line("note", note.clone());
+    }
+    out.trim_end().to_string()
+}
+
+/// A finding with its parameters.
+fn finding_text(finding: &Finding) -> String {
+    let numbers: Vec<String> = finding
+        .parameters
+        .iter()
+        .filter_map(|(name, value)| match value {
+            Parameter::One(one) => Some(format!("{} {}", name.replace('_', " "), estimate(one))),
+            Parameter::List(_) => None,
+        })
+        .collect();
+    format!(
+        "{} {}: {}; confidence {}",
+        words(&finding.physics),
+        said::place(&finding.place),
+        numbers.join(", "),
+        said::share(finding.confidence)
+    )
+}
+
+fn looked_at(adds: &[&str], drops: Option<&str>) -> String {
+    let adds: Vec<String> = adds.iter().map(|name| words(name)).collect();
+    format!("{}{}", adds.join(" and "), drops.map_or(String::new(), |d| format!(" in the place of {}", words(d))))
+}
+
+/// What the search looked at, joint by joint.
+pub(crate) fn explained(problem: &Problem, found: &Found) -> String {
+    let mut out = format!("{:<20} {:<58} {:>10} {:>12}  taken up", "joint", "looked at", "lowers", "unseen, sd");
+    for answer in &found.answers {
+        for tried in &answer.found.tried {
+            let unseen = tried.gain.map_or("-".to_string(), |g| format!("{:.1}", g.in_errors()));
+            let _ = write!(
+                out,
+                "\n{:<20} {:<58} {:>8.1} % {unseen:>12}  {}",
+                problem.joints[answer.joint].name,
+                looked_at(&tried.adds, tried.drops),
+                100.0 * tried.lowers,
+                if tried.taken { "yes" } else { "no" }
+            );
+        }
+    }
+    out += "\nlowers: by which share it lowers the mean loss on recordings that its fit has not seen; unseen: that gain in its own standard errors";
+    out
+}
