@@ -51,7 +51,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     }
 }
 
-/// Opens what is asked, and says what a reader should know first.
+/// Opens what is asked, and prints as notes what a reader should know first.
 ///
 /// # Errors
 /// As [`opened::open`].

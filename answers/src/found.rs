@@ -108,7 +108,7 @@ impl Found {
         }
     }
 
-    /// Everything that a page says before the results: the notes before the search, and those of the search.
+    /// Notes that stand before the results on a page: the notes before the search, and those of the search.
     pub fn all_notes(&self) -> Vec<&str> {
         let searched: &[String] = match &self.device {
             Diagnosed::OneAxis(_) => &[],

@@ -51,10 +51,10 @@ pub struct Explained {
 }
 
 impl Explained {
-    /// Asks a recording, a bag of a run or with `roles` any other. A master that is not what the graph says is written to `out`, where that is given.
+    /// Asks a recording, a bag of a run or with `roles` any other. A master that differs from the graph is written to `out`, where that is given.
     ///
     /// # Errors
-    /// The recording cannot be read or says nothing, the work is interrupted, or `out` cannot be written.
+    /// The recording cannot be read or judged, the work is interrupted, or `out` cannot be written.
     pub fn of(path: &Path, roles: Option<&Path>, out: Option<&Path>, cancel: &Arc<AtomicBool>) -> Result<Explained, Failure> {
         let recording = progress::busy(&format!("reading {}", path.display()), || Recording::read(path, roles))?;
         let answer = progress::about(EXPECTED, |report| {
