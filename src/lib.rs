@@ -32,7 +32,7 @@ mod secret;
 mod servo_runs;
 mod shell;
 pub mod simulate;
-mod stability;
+pub mod stability;
 mod test_bench;
 pub mod why;
 

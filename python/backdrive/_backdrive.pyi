@@ -53,6 +53,19 @@ def simulate(
     columns: str | None,
     progress: Progress,
 ) -> Answer: ...
+def stability(
+    recording: str,
+    *,
+    roles: Any,
+    gain: float | None,
+    mu: float | None,
+    lambda_: float | None,
+    sweep: tuple[float, float, int] | None,
+    grips: list[float] | None,
+    coupling: str | None,
+    parts: dict[str, Any],
+    progress: Progress,
+) -> Answer: ...
 def why(recording: str, *, roles: Any, progress: Progress) -> Answer: ...
 def inspect(files: list[str], *, rate: float | None, columns: list[str] | None, time: str | None, progress: Progress) -> Answer: ...
 def run(arguments: list[str], progress: Progress = None) -> tuple[int, str, list[str], str | None]: ...

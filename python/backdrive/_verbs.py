@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _backdrive, _frames, _toml
+from ._errors import UsageError
 from ._model import Model
 from ._results import Exported, Fit, Interrupted, Prediction, Report, Verdict, fields
 from ._work import INTERRUPTED, Progress, Work
 
 Path = str | os.PathLike[str]
+
+# Parts of a loop that `stability` swaps.
+_PARTS = ("master", "grip", "slave", "environment", "canceller", "canceller_grip", "high_pass", "hand", "edge_without", "sensors", "limits", "script")
 
 
 def _model_file(work: Work, model: Any, name: str = "model.toml") -> str:
@@ -205,11 +209,23 @@ def stability(
     roles: which topic or column is which signal: a file, or the same as dictionaries (docs/roles-example.toml).
     parts: other parts of the loop, as on the command line: `master="model.toml"`, `canceller="none"`.
     """
+    unknown = ", ".join(parts.keys() - set(_PARTS))
+    if unknown:
+        raise UsageError(f"{unknown}: is no part of a loop; there are {', '.join(_PARTS)}", 2)
     with Work(progress) as work:
-        arguments = ["stability", work.file(recording, "recording"), *_options({"gain": gain, "mu": mu, "lambda": lambda_, "roles": _roles(work, roles)})]
-        arguments += _options({"sweep": None if sweep is None else ":".join(_text(x) for x in sweep), "coupling": coupling})
-        arguments += _options({"grips": None if grips is None else ",".join(_text(x) for x in grips), **parts})
-        return _reported(work, arguments)
+        answer = work.answer(
+            _backdrive.stability,
+            work.file(recording, "recording"),
+            roles=_roles(work, roles),
+            gain=gain,
+            mu=mu,
+            lambda_=lambda_,
+            sweep=sweep,
+            grips=None if grips is None else list(grips),
+            coupling=coupling,
+            parts={name: parts.get(name) for name in _PARTS},
+        )
+        return _report(work, answer)
 
 
 def why(recording: Any, *, roles: Path | Mapping[str, Any] | None = None, progress: Progress = True) -> Report:
@@ -237,17 +253,8 @@ def _roles(work: Work, roles: Any) -> str | None:
 
 def _report(work: Work, answer: Any) -> Report:
     text = work.said(answer.json)
-    return Report(text + "\n", work.notes, work.code, work.said(answer.html), text)
-
-
-def _reported(work: Work, arguments: list[str]) -> Report:
-    page = work.path("report.html")
-    text = work.run([*arguments, "--html", page, "--json"])
-    html = None
-    if os.path.exists(page):
-        with open(page, encoding="utf-8") as file:
-            html = work.said(file.read())
-    return Report(text, work.notes, work.code, html, text.rstrip())
+    html = None if answer.html is None else work.said(answer.html)
+    return Report(text + "\n", work.notes, work.code, html, text)
 
 
 def load_bag(path: Path, *, topics: str | Sequence[str] = (), kind: str = "auto") -> Any:

@@ -9,13 +9,17 @@ use backdrive::fit::Refit;
 use backdrive::inspect::inspected;
 use backdrive::model_run::Run;
 use backdrive::simulate::simulated;
+use backdrive::stability::{GRIPS, Judged, spaced};
 use backdrive::why::Explained;
 use backdrive_answers::asked::Asked;
+use backdrive_control::coupling::Law;
 use backdrive_diagnosis::options::Options;
 use backdrive_inspect::Options as Reading;
+use backdrive_nodes::graph::{Hand, Limits, Overrides, Sensors};
 use backdrive_plant::recording::Recording;
 use backdrive_predict::fit::Options as Fitting;
 use backdrive_predict::simulate::Options as Running;
+use backdrive_stability::asked::Options as Judging;
 use pyo3::exceptions::PyBaseException;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -90,7 +94,7 @@ fn columns(py: Python<'_>, table: &Recording) -> Vec<(String, Py<PyBytes>)> {
 
 /// A limit on the clock of so many seconds.
 fn patience(seconds: Option<f64>) -> Result<Option<Duration>, Failure> {
-    let wrong = |s: f64| Failure { code: code::USAGE, message: format!("patience is {s}, and must be above 0") };
+    let wrong = |s: f64| usage(format!("patience is {s}, and must be above 0"));
     let limit = |s: f64| Duration::try_from_secs_f64(s).ok().filter(|limit| !limit.is_zero()).ok_or_else(|| wrong(s));
     seconds.map(limit).transpose()
 }
@@ -159,9 +163,7 @@ pub fn fit_typed(
 ) -> PyResult<Answer> {
     answered(py, progress.as_ref(), move |caller| {
         let effort = effort.unwrap_or(1.0);
-        if !(effort.is_finite() && effort > 0.0) {
-            return Err(Failure { code: code::USAGE, message: format!("effort is {effort}, and must be above 0") });
-        }
+        positive("effort", Some(effort))?;
         let patience = patience(seconds)?.unwrap_or_else(Options::usual_patience);
         let done = Refit::of(&Fitting { model, set, grip, ignored: ignore_signal, effort, patience }, None, false, &caller.stop)?;
         let code = if caller.stop.load(Ordering::SeqCst) { code::INTERRUPTED } else { done.code() };
@@ -202,6 +204,112 @@ pub fn simulate_typed(
     })
 }
 
+/// Parts of a loop that are swapped, by their names on the command line; `None` leaves a part as it was recorded.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Parts {
+    master: Option<PathBuf>,
+    grip: Option<PathBuf>,
+    slave: Option<PathBuf>,
+    environment: Option<PathBuf>,
+    canceller: Option<PathBuf>,
+    canceller_grip: Option<PathBuf>,
+    high_pass: Option<f64>,
+    hand: Option<String>,
+    edge_without: Option<f64>,
+    sensors: Option<String>,
+    limits: Option<String>,
+    script: Option<PathBuf>,
+}
+
+impl Parts {
+    /// As the graph's reader takes them, with the law of the coupling.
+    fn overrides(self, coupling: Option<String>) -> Result<Overrides, Failure> {
+        let law = coupling.iter().find(|law| !Law::ALL.iter().any(|(name, _)| name == law));
+        if let Some(law) = law {
+            let laws: Vec<&str> = Law::ALL.iter().map(|(name, _)| *name).collect();
+            return Err(usage(format!("coupling is \"{law}\", and must be one of {}", laws.join(", "))));
+        }
+        if let Some(hz) = self.high_pass.filter(|hz| !(hz.is_finite() && *hz >= 0.0)) {
+            return Err(usage(format!("high_pass is {hz}, and must be at least 0")));
+        }
+        positive("edge_without", self.edge_without)?;
+        Ok(Overrides {
+            master: self.master,
+            grip: self.grip,
+            slave: self.slave,
+            environment: self.environment,
+            canceller: self.canceller,
+            canceller_grip: self.canceller_grip,
+            high_pass_hz: self.high_pass,
+            hand: choice("hand", self.hand, &Hand::ALL)?,
+            edge_without: self.edge_without,
+            sensors: choice("sensors", self.sensors, &Sensors::ALL)?,
+            limits: choice("limits", self.limits, &Limits::ALL)?,
+            coupling,
+            ..Overrides::default()
+        })
+    }
+}
+
+/// What a word means, written with `_` or `-`.
+fn choice<T: Copy>(name: &str, word: Option<String>, all: &[(&str, T)]) -> Result<Option<T>, Failure> {
+    let Some(word) = word else { return Ok(None) };
+    let plain = word.replace('-', "_");
+    let words: Vec<&str> = all.iter().map(|(word, _)| *word).collect();
+    let found = all.iter().find(|(known, _)| *known == plain).map(|(_, meaning)| Some(*meaning));
+    found.ok_or_else(|| usage(format!("{name} is \"{word}\", and must be one of {}", words.join(", "))))
+}
+
+/// A number above 0, where there is one.
+fn positive(name: &str, value: Option<f64>) -> Result<(), Failure> {
+    match value.filter(|x| !(x.is_finite() && *x > 0.0)) {
+        Some(x) => Err(usage(format!("{name} is {x}, and must be above 0"))),
+        None => Ok(()),
+    }
+}
+
+/// An argument that cannot be used.
+fn usage(message: String) -> Failure {
+    Failure { code: code::USAGE, message }
+}
+
+/// Judges the loop of a recording at a gain.
+///
+/// # Errors
+/// As those of [`diagnose_typed`].
+#[pyfunction(name = "stability")]
+#[pyo3(signature = (recording, *, roles, gain, mu, lambda_, sweep, grips, coupling, parts, progress))]
+#[allow(clippy::too_many_arguments)] // the keywords of the function in Python
+pub fn stability_typed(
+    py: Python<'_>,
+    recording: PathBuf,
+    roles: Option<PathBuf>,
+    gain: Option<f64>,
+    mu: Option<f64>,
+    lambda_: Option<f64>,
+    sweep: Option<(f64, f64, usize)>,
+    grips: Option<Vec<f64>>,
+    coupling: Option<String>,
+    parts: Parts,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
+    answered(py, progress.as_ref(), move |caller| {
+        if gain.is_some() && (mu.is_some() || lambda_.is_some()) {
+            return Err(usage("gain is the product of mu and lambda_; give it, or these".to_string()));
+        }
+        let grips = grips.unwrap_or_else(|| GRIPS.to_vec());
+        let numbers = [("gain", gain), ("mu", mu), ("lambda_", lambda_)];
+        let grip_factors = grips.iter().map(|factor| ("grips", Some(*factor)));
+        numbers.into_iter().chain(grip_factors).try_for_each(|(name, value)| positive(name, value))?;
+        let sweep = sweep.map(|(from, to, count)| spaced(from, to, count).map_err(|why| usage(format!("sweep: {why}")))).transpose()?;
+        let script = parts.script.clone();
+        let how = Judging { recording, roles, changes: parts.overrides(coupling)?, gain, mu, lambda: lambda_, script, grips };
+        let judged = Judged::of(&how, sweep.as_ref().map(|gains| gains.0.as_slice()), &caller.stop)?;
+        Ok(Given { code: judged.code(&caller.stop), json: judged.json()?.to_string(), html: judged.html(), ..Given::default() })
+    })
+}
+
 /// Asks why a recorded loop shakes.
 ///
 /// # Errors
@@ -231,8 +339,7 @@ pub fn inspect_typed(
 ) -> PyResult<Answer> {
     answered(py, progress.as_ref(), move |_| {
         if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0) || time.is_some()) {
-            let message = format!("rate is {rate}, and must be above 0, of tables without a column of times");
-            return Err(Failure { code: code::USAGE, message });
+            return Err(usage(format!("rate is {rate}, and must be above 0, of tables without a column of times")));
         }
         let found = inspected(&files, &Reading { rate_hz: rate, columns, time })?;
         Ok(Given { code: found.code(), json: pretty(&found.json()?)?, html: Some(found.html()), ..Given::default() })
