@@ -46,6 +46,17 @@ pub fn call<S: AsRef<str>>(arguments: &[S], caller: &Arc<Caller>) -> Called {
     Called { code, result, notes, error }
 }
 
+/// Does work in this thread for a caller: its progress and its notes are theirs, and they can end it. Gives the notes beside the result.
+pub fn called<T>(caller: &Arc<Caller>, work: impl FnOnce() -> Result<T, Failure>) -> (Result<T, Failure>, Vec<String>) {
+    let done = {
+        let _calling = Calling::begin(caller);
+        work()
+    };
+    caller.tell(None);
+    let (_, notes) = taken(caller);
+    (done, notes)
+}
+
 fn dispatched(command: &Command) -> Result<u8, Failure> {
     match command {
         Command::Run(_)

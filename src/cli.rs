@@ -29,6 +29,7 @@ mod why;
 
 pub use bag::{Bag, BagExport, BagImport, ExportTo};
 pub use bridge::Bridge;
+pub use changes::words_of;
 pub use compare::Compare;
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
@@ -45,7 +46,7 @@ pub use run::Run;
 pub use secret::Secret;
 pub use shell::{Completions, Man};
 pub use simulate::Simulate;
-pub use stability::Stability;
+pub use stability::{GRIPS, Stability, spaced};
 pub use test_bench::TestBench;
 pub use why::Why;
 

@@ -1,31 +1,26 @@
 //! `backdrive diagnose`: which effects a model lacks, by recordings of its device.
 
 use crate::cli;
-use crate::diagnose_text::text;
-use crate::explain::explained;
 use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::offered::Step;
 use crate::output;
 use crate::progress;
 use answer::{Answer, to_do};
-use backdrive_diagnosis::diagnose::{self, Diagnosis};
-use backdrive_diagnosis::physics::physics_named;
-use backdrive_diagnosis::search::Settings;
-use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
-use backdrive_pages::diagnose::{Shown, page};
-use backdrive_sets::open;
-use backdrive_sets::open::Opened;
+use backdrive_answers::asked::Asked;
+use backdrive_answers::found::{self, Found};
+use backdrive_answers::opened::{self, Opened};
+use backdrive_diagnosis::options::Options;
+use backdrive_diagnosis::verdict::{Word, rival_file};
+use backdrive_pages::diagnose::page;
+use backdrive_sets::open::not_onto;
 use next::next;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub mod answer;
-mod arm;
-mod arm_options;
 pub mod next;
-mod servo;
 
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
@@ -35,55 +30,80 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     let beside = options.out.join(REPORT);
     let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
-    if let Some((set, model)) = servo::asked(options)? {
-        return servo::diagnose(options, &set, model.as_deref(), report, began).map(exit_code);
-    }
-    if let Some((set, model)) = arm::asked(options)? {
-        return arm::diagnose(options, &set, &model, report, began).map(exit_code);
-    }
     let stop = interrupt::heard()?;
-
-    let opened = || open::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", opened)?;
-    for name in [MODEL_FILE, EXPERIMENT_FILE] {
-        open::not_onto(&options.out.join(name), &opened.files, false)?;
-    }
-    for note in &opened.notes {
-        output::note(format_args!("note: {note}"));
-    }
-    let usual = Settings::default();
-    let settings = Settings {
-        without: of_one_axis(&options.without)?,
-        effects: options.effects.map_or(usual.effects, usize::from),
-        effort: options.effort.unwrap_or(usual.effort),
-        patience: options.patience.map_or(usual.patience, Duration::from_secs_f64),
-    };
-    let Diagnosed { found, written, steps } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
+    let opened = read(&asked(options))?;
+    let Written { found, names, steps } = diagnose_into(opened, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
-    let path = options.out.join("time.txt");
-    output::file(&path, format!("{seconds:.2}\n"))?;
+    output::file(&options.out.join("time.txt"), format!("{seconds:.2}\n"))?;
     if options.json {
-        output::json(&Answer { verdict: &found.verdict, next: &steps })?;
+        output::json(&Answer { verdict: found.verdict(), next: &steps })?;
     } else {
-        output::line(text(&found))?;
+        output::line(found.text())?;
         if options.explain {
-            output::line(format_args!("\n{}\n", explained(&found.search)))?;
+            output::line(format_args!("\n{}\n", found.explained()))?;
         }
-        output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
+        output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), names.join(", ")))?;
         to_do(&steps)?;
     }
-    if stop.load(Ordering::SeqCst) {
-        return Err(Failure { code: code::INTERRUPTED, message: "stopped; the results so far are written".to_string() });
+    match ended(&found, &stop) {
+        code::INTERRUPTED => Err(Failure { code: code::INTERRUPTED, message: "stopped; the results so far are written".to_string() }),
+        code => Ok(code),
     }
-    Ok(exit_code(found.verdict.word))
+}
+
+/// Opens what is asked, and prints as notes what a reader should know first.
+///
+/// # Errors
+/// As [`opened::open`].
+pub fn read(asked: &Asked) -> Result<Opened, Failure> {
+    let opened = progress::busy("reading the recordings", || opened::open(asked))?;
+    opened.notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
+    Ok(opened)
+}
+
+/// Diagnoses what was opened and writes nothing. No file is there for the commands of what to do next, so their sentences come alone.
+///
+/// # Errors
+/// When the model cannot be computed on the recordings.
+pub fn in_memory(opened: Opened, stop: &AtomicBool) -> Result<(Found, Vec<Step>), Failure> {
+    let found = searched(opened, stop)?;
+    let steps = next(&found, Path::new("")).into_iter().map(|step| Step::said(step.sentence)).collect();
+    Ok((found, steps))
+}
+
+/// The text of the report.
+pub fn html(found: &Found, steps: &[Step]) -> String {
+    output::html(page(found, steps))
+}
+
+/// The exit code of a diagnosis that has ended, by itself or interrupted.
+pub fn ended(found: &Found, stop: &AtomicBool) -> u8 {
+    if stop.load(Ordering::SeqCst) { code::INTERRUPTED } else { exit_code(found.verdict().word) }
+}
+
+/// What the command line asks.
+fn asked(options: &cli::Diagnose) -> Asked {
+    Asked {
+        set: options.set.clone(),
+        model: options.model.clone(),
+        grip: options.grip.clone(),
+        ignore_signal: options.ignore_signal.clone(),
+        options: Options {
+            without: options.without.clone(),
+            effects: options.effects.map(usize::from),
+            effort: options.effort,
+            patience: options.patience.map(Duration::from_secs_f64),
+            corner_hz: None,
+        },
+    }
 }
 
 /// A diagnosis, and the files that were written of it.
-pub struct Diagnosed {
+pub struct Written {
     /// Everything that was found.
-    pub found: Diagnosis,
+    pub found: Found,
     /// Names of the files in the folder that was given, and the path of a report that was written outside it.
-    pub written: Vec<String>,
+    pub names: Vec<String>,
     /// What to do next with the commands that do it.
     pub steps: Vec<Step>,
 }
@@ -92,56 +112,40 @@ pub struct Diagnosed {
 /// report.
 ///
 /// # Errors
-/// When the folder cannot be written, or the nominal model cannot be simulated on the recordings.
-pub fn diagnose_into(
-    opened: Opened,
-    settings: &Settings,
-    out: &Path,
-    report: Option<&Path>,
-    stop: &AtomicBool,
-) -> Result<Diagnosed, Failure> {
+/// When the folder cannot be written, or the model cannot be computed on the recordings.
+pub fn diagnose_into(opened: Opened, out: &Path, report: Option<&Path>, stop: &AtomicBool) -> Result<Written, Failure> {
+    for name in opened.may_write() {
+        not_onto(&out.join(name), &opened.files, false)?;
+    }
     // What cannot be written is reported before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
-    let files = opened.files;
-    let found = progress::about(settings.expected(), |report| {
-        diagnose::diagnose(opened.problem, settings, Some(stop), report).map_err(Failure::input)
-    })?;
-
-    let write = |name: &str, text: &str| output::file(&out.join(name), text);
-    let json = serde_json::to_string_pretty(&found.verdict).map_err(Failure::input)?;
-    write(VERDICT_FILE, &format!("{json}\n"))?;
-    write(MODEL_FILE, &found.files.model)?;
-    let mut written = vec![VERDICT_FILE.to_string(), MODEL_FILE.to_string()];
+    let found = searched(opened, stop)?;
     // Rivals of an earlier diagnosis are none of this one.
     for number in 1..=9 {
         let _ = std::fs::remove_file(out.join(rival_file(number)));
     }
-    for (index, rival) in found.files.rivals.iter().enumerate() {
-        write(&rival_file(index + 1), rival)?;
+    let mut names = Vec::new();
+    for (name, text) in found.files()? {
+        output::file(&out.join(&name), text)?;
+        names.push(name);
     }
-    if let Some(experiment) = &found.files.experiment {
-        write(EXPERIMENT_FILE, experiment)?;
-        written.push(EXPERIMENT_FILE.to_string());
-    }
-    let steps = next(&found, out, &files);
+    names.retain(|name| !found.verdict().rival_models.contains(name));
+    let steps = next(&found, out);
     if let Some(report) = report {
-        let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes, steps: &steps };
-        output::page(report, page(&shown))?;
-        written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
+        output::page(report, page(&found, &steps))?;
+        names.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
-    Ok(Diagnosed { found, written, steps })
+    Ok(Written { found, names, steps })
 }
 
-/// Physics to leave out that a device of one axis may have.
-fn of_one_axis(without: &[String]) -> Result<Vec<String>, Failure> {
-    match without.iter().find(|name| physics_named(name).is_none()) {
-        Some(name) => {
-            let message = format!("--without {name}: it is only for arms, and this model has no [robot]; omit it");
-            Err(Failure { code: code::USAGE, message })
-        }
-        None => Ok(without.to_vec()),
-    }
+/// Searches, and shows how far it is.
+fn searched(opened: Opened, stop: &AtomicBool) -> Result<Found, Failure> {
+    let found = match opened.expected() {
+        Some(limit) => progress::about(limit, |report| found::diagnose(opened, Some(stop), report)),
+        None => progress::stages(|report| found::diagnose(opened, Some(stop), report)),
+    };
+    Ok(found?)
 }
 
 fn shown(folder: &Path) -> String {

@@ -1,5 +1,6 @@
 //! Why a command fails, and its exit code.
 
+use backdrive_answers::error::AnswerError;
 use backdrive_bags::BagError;
 use backdrive_inspect::InspectError;
 use backdrive_launch::asked::AskedError;
@@ -154,6 +155,15 @@ impl From<backdrive_stability::asked::AskedError> for Failure {
 impl From<backdrive_why::recording::RecordingError> for Failure {
     fn from(error: backdrive_why::recording::RecordingError) -> Failure {
         Failure::input(error)
+    }
+}
+
+impl From<AnswerError> for Failure {
+    fn from(error: AnswerError) -> Failure {
+        match error {
+            AnswerError::Input(message) => Failure::input(message),
+            AnswerError::Usage(message) => Failure { code: code::USAGE, message },
+        }
     }
 }
 

@@ -9,32 +9,21 @@ use crate::interrupt;
 use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::servo_runs;
+use crate::servo_runs::ServoRefit;
 use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_pages::parts::file_name;
 use backdrive_plant::model::Model;
 use backdrive_predict::fit::{Fit, Fitted, Options};
 use backdrive_report::{number, percent};
 use backdrive_sets::open;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Fits, writes, and prints the confidence intervals of the parameters.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
-    let model = Model::load(&options.model)?;
-    if !model.servos.is_empty() {
-        return servo_runs::fit(options);
-    }
-    if model.arm.is_some() {
-        let model = options.model.display();
-        return Err(Failure::input(format!(
-            "{model}: [robot]: fit is for models of one axis; the parameters of an arm are refitted by `backdrive diagnose`"
-        )));
-    }
-    let stop = interrupt::heard()?;
     let asked = Options {
         model: options.model.clone(),
         set: options.set.clone(),
@@ -43,47 +32,114 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         effort: options.effort,
         patience: Duration::from_secs_f64(options.patience),
     };
-    let fit = progress::busy("reading the recordings", || Fit::read(&asked))?;
+    let stop = interrupt::heard()?;
+    let done = Refit::of(&asked, options.out.as_deref(), options.overwrite, &stop)?;
     if let Some(out) = &options.out {
-        open::not_onto(out, &fit.files, options.overwrite)?;
+        output::file(out, done.model())?;
     }
-    fit.notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
-    let fitted = progress::about(fit.expected(), |report| fit.run(&stop, report))?;
-    if let Some(out) = &options.out {
-        output::file(out, &fitted.model)?;
-    }
-    let steps = next(options, &fit.files, &fitted);
-    let disagree = !fitted.per_record.disagreements().is_empty();
-    if options.json {
-        let all = json!({
-            "model": fit.problem.model.name,
-            "numbers": fitted.rows,
-            "correlations": fitted.pairs,
-            "given": fitted.given,
-            "fitted": fitted.fitted,
-            "records": fitted.per_record,
-            "agree": fitted.per_record.agree(),
-            "kept": fitted.kept,
-            "compared": fitted.per_record.compared(),
-            "next": steps,
-        });
-        output::json(&all)?;
-    } else {
-        output::line(text(&fit.problem, &fitted))?;
-        to_do(&steps)?;
-    }
-    if let Some(out) = &options.out {
-        let kept = match fitted.kept.len() {
-            0 => String::new(),
-            1 => format!("; {} is not determined by the recordings and keeps its nominal value", fitted.kept[0]),
-            n => format!("; {n} parameters are not determined by the recordings and keep their nominal values: {}", fitted.kept.join(", ")),
-        };
-        output::note(format_args!("wrote {}{kept}", out.display()));
+    match &done {
+        Refit::Servo(joints) if options.json => output::json(&joints.json())?,
+        Refit::Servo(joints) => joints.told(options.out.as_deref())?,
+        Refit::OneAxis(both) => {
+            let (fit, fitted) = both.as_ref();
+            let steps = next(options, &fit.files, fitted);
+            if options.json {
+                let mut all = done.json();
+                all["next"] = serde_json::to_value(&steps).map_err(Failure::input)?;
+                output::json(&all)?;
+            } else {
+                output::line(text(&fit.problem, fitted))?;
+                to_do(&steps)?;
+            }
+            if let Some(out) = &options.out {
+                output::note(format_args!("wrote {}{}", out.display(), kept(fitted)));
+            }
+        }
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; the parameters are those reached until then".to_string() });
     }
-    Ok(if disagree { code::NEGATIVE } else { 0 })
+    Ok(done.code())
+}
+
+/// A refit, by the kind of the device.
+pub enum Refit {
+    /// A network of one axis: what was fitted, and the result.
+    OneAxis(Box<(Fit, Fitted)>),
+    /// Joints that position servos drive.
+    Servo(ServoRefit),
+}
+
+impl Refit {
+    /// Refits a model. `out` is a file that the caller writes afterwards: it may not be one that is read, the model with `overwrite` excepted.
+    ///
+    /// # Errors
+    /// A file is missing or wrong, or the recordings do not suit the model.
+    pub fn of(asked: &Options, out: Option<&Path>, overwrite: bool, stop: &AtomicBool) -> Result<Refit, Failure> {
+        let model = Model::load(&asked.model)?;
+        if !model.servos.is_empty() {
+            return ServoRefit::of(asked, out, overwrite).map(Refit::Servo);
+        }
+        if model.arm.is_some() {
+            let model = asked.model.display();
+            return Err(Failure::input(format!(
+                "{model}: [robot]: fit takes models of one axis; the numbers of an arm are refitted by `backdrive diagnose`"
+            )));
+        }
+        let fit = progress::busy("reading the recordings", || Fit::read(asked))?;
+        if let Some(out) = out {
+            open::not_onto(out, &fit.files, overwrite)?;
+        }
+        fit.notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
+        let fitted = progress::about(fit.expected(), |report| fit.run(stop, report))?;
+        Ok(Refit::OneAxis(Box::new((fit, fitted))))
+    }
+
+    /// The text of the refitted model's file.
+    pub fn model(&self) -> String {
+        match self {
+            Refit::OneAxis(both) => both.1.model.clone(),
+            Refit::Servo(joints) => joints.model(),
+        }
+    }
+
+    /// The result for programs.
+    pub fn json(&self) -> Value {
+        match self {
+            Refit::OneAxis(both) => {
+                let (fit, fitted) = both.as_ref();
+                json!({
+                    "model": fit.problem.model.name,
+                    "numbers": fitted.rows,
+                    "correlations": fitted.pairs,
+                    "given": fitted.given,
+                    "fitted": fitted.fitted,
+                    "records": fitted.per_record,
+                    "agree": fitted.per_record.agree(),
+                    "kept": fitted.kept,
+                    "compared": fitted.per_record.compared(),
+                })
+            }
+            Refit::Servo(joints) => joints.json(),
+        }
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Refit::OneAxis(both) if !both.1.per_record.disagreements().is_empty() => code::NEGATIVE,
+            Refit::OneAxis(_) | Refit::Servo(_) => 0,
+        }
+    }
+}
+
+/// What of the parameters is not determined, as the end of a sentence.
+fn kept(fitted: &Fitted) -> String {
+    match fitted.kept.len() {
+        0 => String::new(),
+        1 => format!("; {} is not determined by the recordings and keeps its nominal value", fitted.kept[0]),
+        n => format!("; {n} parameters are not determined by the recordings and keep their nominal values: {}", fitted.kept.join(", ")),
+    }
 }
 
 /// What to do with the parameters, the most useful first.

@@ -159,10 +159,10 @@ pub fn own_arguments() -> Vec<OsString> {
     }
 }
 
-/// The command line of this process, for the foot of a page.
-pub fn own_command() -> String {
+/// The command line of this process, for the foot of a page; `None` where a caller in the same process gave no arguments.
+pub fn own_command() -> Option<String> {
     let words: Vec<String> = own_arguments().iter().map(|w| shell_word(&w.to_string_lossy())).collect();
-    format!("backdrive {}", words.join(" "))
+    (!words.is_empty()).then(|| format!("backdrive {}", words.join(" ")))
 }
 
 /// A path as a user types it: relative where it lies below the working folder.

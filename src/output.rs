@@ -137,9 +137,15 @@ pub fn csv(recording: &Recording, path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// As [`file()`].
-pub fn page(path: &Path, mut page: Page) -> Result<(), Failure> {
-    page.text(&format!("Made by backdrive {} with: {}", env!("CARGO_PKG_VERSION"), own_command()));
-    file(path, page.html())
+pub fn page(path: &Path, page: Page) -> Result<(), Failure> {
+    file(path, html(page))
+}
+
+/// The text of a page, with the version that made it at its foot, and the command where there is one.
+pub fn html(mut page: Page) -> String {
+    let with = own_command().map_or_else(String::new, |command| format!(" with: {command}"));
+    page.text(&format!("Made by backdrive {}{with}", env!("CARGO_PKG_VERSION")));
+    page.html()
 }
 
 /// A file that `write` makes: at a path beside the one that is asked for, where nothing is yet and to which it may return as often as it

@@ -75,6 +75,12 @@ pub fn busy<T>(title: &str, work: impl FnOnce() -> T) -> T {
     work()
 }
 
+/// Does what may take long and reports its stages, without a known length.
+pub fn stages<T>(work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T) -> T {
+    let busy = Busy::begin("");
+    work(&|stage: &str| busy.0.set_message(stage.to_string()))
+}
+
 /// What a terminal hears of a run.
 #[derive(Default)]
 pub struct Terminal(RefCell<Option<ProgressBar>>);

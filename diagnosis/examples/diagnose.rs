@@ -4,9 +4,9 @@
 //! `diagnose --list-tuning` lists them.
 
 use backdrive_diagnosis::diagnose::diagnose;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::candidate::advantage_over;
 use backdrive_diagnosis::recordings::problem::Problem;
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::tuning::Tuning;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, rival_file};
 use std::path::{Path, PathBuf};
@@ -34,12 +34,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     tuning.adopt().map_err(|_| "the tuning is in use already")?;
     let began = Instant::now();
     let problem = Problem::open(Path::new(set), after("--model").as_deref().map(Path::new))?;
-    let settings = Settings { without: after("--without").into_iter().collect(), ..Default::default() };
-    let settings = match after("--effort").and_then(|p| p.parse().ok()) {
-        Some(effort) => Settings { effort, ..settings },
-        None => settings,
+    let options = Options { without: after("--without").into_iter().collect(), ..Default::default() };
+    let options = match after("--effort").and_then(|p| p.parse().ok()) {
+        effort @ Some(_) => Options { effort, ..options },
+        None => options,
     };
-    let said = diagnose(problem, &settings, None, &|what| {
+    let said = diagnose(problem, &options, None, &|what| {
         if talk {
             eprintln!("{:.2} s {what}", began.elapsed().as_secs_f64());
         }

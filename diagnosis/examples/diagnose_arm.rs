@@ -1,6 +1,7 @@
 //! Diagnoses a set as `backdrive diagnose` does: `diagnose_arm SET OUT`. Smaller to build than the whole command line; `score_arms.py` takes either.
-use backdrive_diagnosis::arms::diagnose::{EXPERIMENT_FILE, Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::{EXPERIMENT_FILE, diagnose};
 use backdrive_diagnosis::arms::problem::Problem;
+use backdrive_diagnosis::options::Options;
 use backdrive_plant::set::RecordingSet;
 use std::path::PathBuf;
 
@@ -8,9 +9,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);
     let (Some(set), Some(out)) = (args.next(), args.next()) else { return Err("usage: diagnose_arm SET OUT [CORNER_HZ]".into()) };
     let out = PathBuf::from(out);
-    let settings = Settings { corner_hz: args.next().and_then(|c| c.parse().ok()), ..Settings::default() };
+    let options = Options { corner_hz: args.next().and_then(|c| c.parse().ok()), ..Options::default() };
     let problem = Problem::open(&RecordingSet::open(set.as_ref())?, None)?;
-    let found = diagnose(&problem, &settings)?;
+    let found = diagnose(&problem, &options, None, &|_| ())?;
     std::fs::create_dir_all(&out)?;
     std::fs::write(out.join("verdict.json"), serde_json::to_string_pretty(&found.verdict)? + "\n")?;
     std::fs::write(out.join("model.diagnosed.toml"), &found.model)?;

@@ -2,9 +2,10 @@
 //! finer steps than the diagnosis takes. They are measured with noise and encoders. The diagnosis receives their models with parameters that are off in
 //! half of the cases.
 
+use backdrive_diagnosis::options;
 use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::search::search;
 use backdrive_diagnosis::verdict::verdict;
 use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::recording::Recording;
@@ -161,7 +162,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for seed in first..first + count {
         let (name, problem) = draw(seed)?;
         let began = std::time::Instant::now();
-        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {})?;
+        let found = search(&problem, &options::Options::default(), Limit::default(), &|_| {})?;
         let (said, _) = verdict(&problem, &found, &[], None, Limit::default())?;
         let alarm = !said.word.is_structure_right();
         alarms += u32::from(alarm);

@@ -7,11 +7,12 @@
 
 use backdrive_diagnosis::belief::choice::chosen;
 use backdrive_diagnosis::belief::intervals::Uncertainty;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::candidate::Candidate;
 use backdrive_diagnosis::output_error::evaluator::Evaluator;
 use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::recordings::problem::Problem;
-use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::search::search;
 use backdrive_diagnosis::tuning::tuning;
 use std::path::Path;
 
@@ -28,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ratios = Vec::new();
     for set in &sets {
         let problem = Problem::open(Path::new(set), None)?;
-        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {})?;
+        let found = search(&problem, &Options::default(), Limit::default(), &|_| {})?;
         let best = chosen(&found);
         let evaluator = Evaluator { noise_sd: found.noise_sd.clone(), ..Evaluator::new(&problem) };
         let spread = Uncertainty::measured(&evaluator, best);

@@ -9,13 +9,14 @@ use crate::belief::per_record::{PerRecord, fit_each};
 use crate::belief::released_parameters::hold_with_released_parameters;
 use crate::equation_error::{OnForces, inverse, search_on_forces, with_model};
 use crate::locate::{self, Location, locate};
+use crate::options::Options;
 use crate::output_error::candidate::price;
 use crate::output_error::hold;
 use crate::output_error::structure::Structure;
 use crate::output_error::work::{Budget, Limit};
 use crate::recordings::problem::Problem;
 use crate::recordings::thinned::thinned;
-use crate::search::{Search, SearchError, Settings, search};
+use crate::search::{Search, SearchError, search};
 use crate::tuning::tuning;
 use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
 use std::sync::atomic::AtomicBool;
@@ -55,11 +56,11 @@ pub enum DiagnosisError {
 /// When the nominal model cannot be simulated on the recordings, or what was found cannot be written into its text.
 pub fn diagnose(
     problem: Problem,
-    settings: &Settings,
+    options: &Options,
     stop: Option<&AtomicBool>,
     report: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnosisError> {
-    let limit = settings.limit(stop);
+    let limit = options.limit(stop);
     report("looking at the recordings");
     let mut remarks = audit(&problem);
     let (problem, dead) = problem.without_dead_outputs();
@@ -72,7 +73,7 @@ pub fn diagnose(
     // A comparison with the signal's own position is stronger evidence than one with a model.
     remarks.retain(|r| !(matches!(r.about, "sign" | "unit") && contradicted.iter().any(|c| c.signal == r.signal)));
     remarks.extend(contradicted);
-    let (problem, search) = searched(problem, settings, limit, report, &mut remarks)?;
+    let (problem, search) = searched(problem, options, limit, report, &mut remarks)?;
     remarks.extend(search.forces.as_ref().map(of_band));
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
@@ -89,26 +90,26 @@ pub fn diagnose(
 /// not drift: there it has more to say than the force, which near a resonance is a small difference.
 fn searched(
     problem: Problem,
-    settings: &Settings,
+    options: &Options,
     limit: Limit,
     report: &(dyn Fn(&str) + Sync),
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
     let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
-    let direct = match search_on_forces(&problem, settings, limit, report) {
+    let direct = match search_on_forces(&problem, options, limit, report) {
         Some(found) if !is_beyond(&found.1) => return Ok(found),
         direct => direct,
     };
     let turned = inverse(&problem);
     let drifts = problem.drifts();
     let mut of_simulation = Vec::new();
-    let simulated = by_simulation(problem, settings, limit, report, &mut of_simulation)?;
+    let simulated = by_simulation(problem, options, limit, report, &mut of_simulation)?;
     let best = chosen(&simulated.1);
     let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
     let forces_say_more = !is_explained && (drifts || best.structure.added.is_empty());
     let on_forces = match (direct, turned) {
         (Some(found), _) => Some(found),
-        (None, Some(turned)) if forces_say_more => search_on_forces(&turned, settings, limit, report),
+        (None, Some(turned)) if forces_say_more => search_on_forces(&turned, options, limit, report),
         (None, _) => None,
     };
     match on_forces.filter(|found| !leaves_less(&simulated, found)) {
@@ -156,16 +157,16 @@ fn of_band(forces: &OnForces) -> Remark {
 /// Searches by simulation of the whole model.
 fn by_simulation(
     problem: Problem,
-    settings: &Settings,
+    options: &Options,
     limit: Limit,
     report: &(dyn Fn(&str) + Sync),
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
     let (problem, fewer) = thinned(problem);
     remarks.extend(fewer);
-    let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, remarks)?;
+    let (problem, search) = with_inputs_as_they_run(problem, options, limit, report, remarks)?;
     report("fitting what could stand in its place");
-    let mut search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
+    let mut search = with_contenders(&problem, search, &options.without, &Budget::new(tuning().experiment.contender_work, limit));
     hold_with_released_parameters(&problem, &mut search, limit);
     without_what_may_be_nothing(&problem, &mut search);
     Ok((problem, search))
@@ -175,19 +176,19 @@ fn by_simulation(
 /// explains them better.
 fn with_inputs_as_they_run(
     problem: Problem,
-    settings: &Settings,
+    options: &Options,
     limit: Limit,
     report: &(dyn Fn(&str) + Sync),
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
-    let first = search(&problem, settings, limit, report)?;
+    let first = search(&problem, options, limit, report)?;
     let running: Vec<usize> = first.holds.iter().filter(|told| told.runs_on()).map(|told| told.input).collect();
     if running.is_empty() {
         return Ok((problem, first));
     }
     report("once more with inputs that run on between their samples");
     let other = hold::linear(&problem, &running);
-    let again = search(&other, settings, limit, report)?;
+    let again = search(&other, options, limit, report)?;
     let least = |search: &Search| {
         let all = search.found.iter().chain(std::iter::once(&search.nominal));
         all.map(|c| price(c, search.samples, first.nominal.correlation_time)).fold(f64::INFINITY, f64::min)

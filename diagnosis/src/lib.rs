@@ -15,6 +15,7 @@ pub mod equation_error;
 pub mod experiment;
 pub mod hypothesis;
 pub mod locate;
+pub mod options;
 pub mod output_error;
 pub mod physics;
 pub mod recordings;

@@ -2,11 +2,12 @@
 //! more remains.
 
 use backdrive_diagnosis::diagnose::diagnose;
+use backdrive_diagnosis::options;
 use backdrive_diagnosis::output_error::error_budget::Source;
 use backdrive_diagnosis::output_error::hold;
 use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::search::search;
 use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Verdict, Word, timing, verdict};
 use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Hold, Model};
@@ -58,7 +59,7 @@ impl Bench<'_> {
 
     fn said(&self, seed: u64) -> Verdict {
         let problem = self.problem(seed);
-        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
+        let found = search(&problem, &options::Options::default(), Limit::default(), &|_| {}).unwrap();
         verdict(&problem, &found, &timing(&problem, &found), None, Limit::default()).unwrap().0
     }
 }
@@ -204,7 +205,7 @@ fn dry_friction_is_claimed_although_more_remains() {
 fn an_input_that_runs_on_between_its_samples_is_no_missing_physics() {
     let truth = CHAIN.replace("on = \"a\"\n", "on = \"a\"\nhold = \"linear\"\n");
     let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 5e-7, input_noise: 0.0, excitations: sweeps(2.0, 0.5, 60.0) };
-    let done = diagnose(bench.problem(1), &Settings::default(), None, &|_| {}).unwrap();
+    let done = diagnose(bench.problem(1), &options::Options::default(), None, &|_| {}).unwrap();
     assert!(done.verdict.word.is_structure_right() && done.verdict.findings.is_empty(), "{:#?}", done.verdict);
     assert!(done.remarks.iter().any(|remark| remark.about == "hold" && remark.signal == "push"), "{:#?}", done.remarks);
     // The model's text simulates as the model was simulated here.
@@ -266,7 +267,7 @@ fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_pro
     };
     let bench =
         Bench { truth: &truth, nominal: PUSHED, noise_sd: 1e-3, input_noise: 0.0, excitations: vec![push(1.0), push(1.7), push(1.3)] };
-    let first = diagnose(bench.problem(5), &Settings::default(), None, &|_| {}).unwrap();
+    let first = diagnose(bench.problem(5), &options::Options::default(), None, &|_| {}).unwrap();
     let said = &first.verdict;
     println!("{} {:?}", said.sentence, said.next_experiment);
     assert_eq!(said.word, Word::Ambiguous, "{}", said.sentence);
@@ -292,7 +293,7 @@ fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_pro
     }
     let wider =
         Problem::new(PUSHED.to_string(), "nominal.toml".into(), problem.model, problem.fit, problem.held_out, Initial::Rest).unwrap();
-    let second = diagnose(wider, &Settings::default(), None, &|_| {}).unwrap().verdict;
+    let second = diagnose(wider, &options::Options::default(), None, &|_| {}).unwrap().verdict;
     println!("{}", second.sentence);
     assert_eq!((second.word, second.findings[0].physics.as_str()), (Word::Missing, "coulomb"), "{}", second.sentence);
     assert!(second.findings[0].confidence > finding.confidence);

@@ -1,8 +1,8 @@
 //! Motion and force both recorded: laws are named from the forces along the motion, also where the motion is known to a step and the drive rests.
 
 use backdrive_diagnosis::diagnose::diagnose;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{Parameter, Verdict, Word};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
@@ -84,7 +84,7 @@ fn said(hidden: impl Fn([f64; 3]) -> f64, noise: f64, rest_s: f64, step: f64) ->
         .collect();
     let (fit, held_out) = (records[..2].to_vec(), records[2..].to_vec());
     let problem = Problem::new(NOMINAL.to_string(), "lever.toml".into(), model, fit, held_out, Initial::Free).unwrap();
-    diagnose(problem, &Settings::default(), None, &|_| ()).unwrap().verdict
+    diagnose(problem, &Options::default(), None, &|_| ()).unwrap().verdict
 }
 
 fn number(verdict: &Verdict, physics: &str, key: &str) -> f64 {

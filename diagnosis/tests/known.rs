@@ -3,11 +3,12 @@
 use backdrive_diagnosis::belief::compare::unseen;
 use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options;
 use backdrive_diagnosis::output_error::evaluator::Evaluator;
 use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::search::search;
 use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::{Files, Finding, Parameter, Verdict, Word, verdict};
 use backdrive_plant::model::Model;
@@ -122,8 +123,8 @@ fn refitted_numbers_lie_in_their_intervals() {
 }
 
 /// Verdict and files of a search on a problem.
-fn said(problem: &Problem, settings: &Settings) -> (Verdict, Files) {
-    let found = search(problem, settings, Limit::default(), &|_| {}).unwrap();
+fn said(problem: &Problem, options: &options::Options) -> (Verdict, Files) {
+    let found = search(problem, options, Limit::default(), &|_| {}).unwrap();
     verdict(problem, &found, &[], None, Limit::default()).unwrap()
 }
 
@@ -142,7 +143,7 @@ fn at_load(finding: &Finding) -> bool {
 #[test]
 fn a_force_limit_that_was_left_out_is_named() {
     let problem = recorded(&NOMINAL.replace("on = \"motor\"\n", "on = \"motor\"\nsaturation = 3.7\n"), 5);
-    let (said, _) = said(&problem, &Settings::default());
+    let (said, _) = said(&problem, &options::Options::default());
     assert_eq!(said.word, Word::Missing, "{said:#?}");
     let [only] = said.findings.as_slice() else { panic!("{said:#?}") };
     assert_eq!((only.physics.as_str(), &only.place), ("saturation", &Place::Signal("force".to_string())), "{only:#?}");
@@ -153,7 +154,7 @@ fn a_force_limit_that_was_left_out_is_named() {
 #[test]
 fn dry_friction_that_was_left_out_is_named() {
     let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 2);
-    let (said, files) = said(&problem, &Settings::default());
+    let (said, files) = said(&problem, &options::Options::default());
     assert_eq!(said.word, Word::Missing, "{said:#?}");
     let first = &said.findings[0];
     assert_eq!((first.physics.as_str(), at_load(first)), ("coulomb", true), "{said:#?}");
@@ -176,7 +177,7 @@ fn dry_friction_that_was_left_out_is_named() {
 fn two_effects_at_once_are_both_named() {
     let late = NOMINAL.replace("on = \"motor\"\n", "on = \"motor\"\ndelay = 0.004\n");
     let problem = recorded(&format!("{late}{COULOMB}"), 8);
-    let (said, _) = said(&problem, &Settings::default());
+    let (said, _) = said(&problem, &options::Options::default());
     assert_eq!((said.word, said.findings.len()), (Word::Missing, 2), "{said:#?}");
     assert!(said.findings.iter().any(|f| f.physics == "delay"), "{:#?}", said.findings);
     // Dry friction, by whichever law has Coulomb's as a limit: on a slow machine there is no time to try the simplest last.
@@ -188,7 +189,7 @@ fn two_effects_at_once_are_both_named() {
 #[test]
 fn without_the_true_law_no_other_is_claimed_surely() {
     let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 9);
-    let (said, _) = said(&problem, &Settings { without: vec!["coulomb".to_string()], ..Settings::default() });
+    let (said, _) = said(&problem, &options::Options { without: vec!["coulomb".to_string()], ..options::Options::default() });
     let sure = said.findings.first().map_or(0.0, |f| f.confidence);
     // Dahl's law contains Coulomb's and is withheld with it, so nothing of the library is right.
     assert!(matches!(said.word, Word::Unexplained | Word::Ambiguous) || sure < 0.5, "{said:#?}");
@@ -197,14 +198,14 @@ fn without_the_true_law_no_other_is_claimed_surely() {
 #[test]
 fn wrong_numbers_alone_are_no_physics() {
     let problem = recorded(&NOMINAL.replace("900.0", "1300.0").replace("load = 0.4", "load = 0.33"), 3);
-    let (said, _) = said(&problem, &Settings::default());
+    let (said, _) = said(&problem, &options::Options::default());
     assert_eq!(said.word, Word::Parameters, "{said:#?}");
 }
 
 #[test]
 fn a_right_model_lacks_nothing() {
     for seed in 4..7 {
-        let (said, _) = said(&recorded(NOMINAL, seed), &Settings::default());
+        let (said, _) = said(&recorded(NOMINAL, seed), &options::Options::default());
         assert_eq!(said.word, Word::NothingMissing, "{said:#?}");
     }
 }
@@ -281,7 +282,7 @@ fn switched_on_again(condition: Option<Condition>) -> Problem {
 
 #[test]
 fn where_an_encoder_counts_from_is_a_number_of_its_session() {
-    let verdict_of = |condition: Option<Condition>| said(&switched_on_again(condition), &Settings::default()).0;
+    let verdict_of = |condition: Option<Condition>| said(&switched_on_again(condition), &options::Options::default()).0;
     let is_ripple = |said: &Verdict| said.findings.first().is_some_and(|f| f.physics == "cogging");
     // Where the set does not say so, the recordings that no fit has seen speak against a ripple.
     assert!(!is_ripple(&verdict_of(None)));

@@ -8,9 +8,9 @@ use backdrive_diagnosis::audit;
 use backdrive_diagnosis::belief::compare::mean_squares;
 use backdrive_diagnosis::diagnose::{Diagnosis, diagnose};
 use backdrive_diagnosis::hypothesis::Family;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::recordings::problem::Problem;
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::Parameter;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ fn case(name: &str) -> Option<PathBuf> {
 
 fn diagnosed(folder: &Path) -> Diagnosis {
     let problem = Problem::open(&folder.join("set.toml"), None).unwrap();
-    diagnose(problem, &Settings::default(), None, &|_| ()).unwrap()
+    diagnose(problem, &Options::default(), None, &|_| ()).unwrap()
 }
 
 /// A parameter of the finding of this effect.
@@ -109,7 +109,7 @@ fn play_behind_a_spring_is_found() {
 fn a_speed_that_contradicts_its_position_is_told_and_left_out() {
     let Some(folder) = case("03-speed-column-against-position") else { return };
     for (set, gain) in [("set.toml", "3.33 times"), ("set-sign.toml", "-1 times")] {
-        let found = diagnose(Problem::open(&folder.join(set), None).unwrap(), &Settings::default(), None, &|_| ()).unwrap();
+        let found = diagnose(Problem::open(&folder.join(set), None).unwrap(), &Options::default(), None, &|_| ()).unwrap();
         let told = found.remarks.iter().find(|r| r.about == "velocity").unwrap();
         assert!(told.signal == "speed" && told.text.contains(gain), "{told}");
         near(number(&found, "coulomb", "force"), 4.0e-3, 0.02);

@@ -7,7 +7,6 @@
 
 pub mod compare;
 pub mod diagnose;
-pub mod estimate;
 pub mod inspect;
 pub mod offered;
 pub mod parts;

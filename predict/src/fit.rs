@@ -6,11 +6,12 @@ use backdrive_diagnosis::belief::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::belief::parameters::{Pair, Row, correlated, refitted_text, rows};
 use backdrive_diagnosis::belief::per_record::{PerRecord, fit_each};
+use backdrive_diagnosis::options::Options as Asked;
 use backdrive_diagnosis::output_error::structure::{FreeParameter, Role, Structure};
 use backdrive_diagnosis::output_error::work::{Budget, Limit};
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::recordings::problem::Problem;
-use backdrive_diagnosis::search::{Search, Settings, search};
+use backdrive_diagnosis::search::{Search, search};
 use backdrive_sets::open;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -44,7 +45,7 @@ pub struct Fit {
     pub files: Vec<PathBuf>,
     /// What a person should know of the recordings: a sentence each.
     pub notes: Vec<String>,
-    settings: Settings,
+    asked: Asked,
 }
 
 /// The result of a fit.
@@ -76,13 +77,13 @@ impl Fit {
         let notes = opened.notes.into_iter().chain(contradicted.iter().map(|remark| remark.to_string())).collect();
         // With every effect withheld a search is the refit of the nominal model alone.
         let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-        let settings = Settings { without, effort: options.effort, patience: options.patience, ..Settings::default() };
-        Ok(Fit { problem, files: opened.files, notes, settings })
+        let asked = Asked { without, effort: Some(options.effort), patience: Some(options.patience), ..Asked::default() };
+        Ok(Fit { problem, files: opened.files, notes, asked })
     }
 
     /// About how long the fit takes at most.
     pub fn expected(&self) -> Duration {
-        self.settings.expected()
+        self.asked.expected()
     }
 
     /// Fits. `report` hears the stages of the work; `stop` ends it with the parameters reached until then.
@@ -90,18 +91,18 @@ impl Fit {
     /// # Errors
     /// The model cannot be simulated on the recordings.
     pub fn run(&self, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, PredictError> {
-        refitted(&self.problem, &self.settings, self.settings.limit(Some(stop)), report)
+        refitted(&self.problem, &self.asked, self.asked.limit(Some(stop)), report)
     }
 }
 
 /// How often parameters that the recordings do not determine are taken out and the rest is fitted again, at most.
 const ROUNDS: usize = 3;
 
-fn refitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, PredictError> {
-    let refit = |problem: &Problem| search(problem, settings, limit, report).map_err(PredictError::input);
+fn refitted(problem: &Problem, asked: &Asked, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, PredictError> {
+    let refit = |problem: &Problem| search(problem, asked, limit, report).map_err(PredictError::input);
     let Search { mut nominal, noise_sd, .. } = refit(problem)?;
     report("fitting each record alone");
-    let per_record = fit_each(problem, &nominal, &noise_sd, &Budget::new(settings.work(), limit));
+    let per_record = fit_each(problem, &nominal, &noise_sd, &Budget::new(asked.work(), limit));
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &noise_sd);
     // What the recordings do not determine keeps its nominal value, and the rest is fitted around it: written as fitted, such parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from . import _backdrive
@@ -83,10 +83,14 @@ def write(frame: Any, path: str, name: str) -> None:
 
 def read(path: str, kind: str = "auto") -> Any:
     """Reads a table of numbers as a frame of a kind; `auto` is pandas where it is installed, else a dictionary of arrays."""
+    return of_bytes(zip(*_backdrive.read_table(path)), kind)
+
+
+def of_bytes(columns: Iterable[tuple[str, bytes]], kind: str) -> Any:
+    """Columns, each the bytes of doubles, as a frame of a kind."""
     import numpy
 
-    names, columns = _backdrive.read_table(path)
-    return of_kind({name: numpy.frombuffer(column, dtype="<f8").copy() for name, column in zip(names, columns)}, kind)
+    return of_kind({name: numpy.frombuffer(column, dtype="<f8").copy() for name, column in columns}, kind)
 
 
 def of_kind(arrays: dict[str, Any], kind: str) -> Any:

@@ -106,8 +106,8 @@ class Verdict(Report):
     detectable: list[Fields] | None
     arm: Fields | None
 
-    def __init__(self, files: dict[str, str], notes: list[str], code: int, said: str, folder: str | None) -> None:
-        super().__init__(files["verdict.json"], notes, code, files.get("report.html"), said)
+    def __init__(self, files: dict[str, str], notes: list[str], code: int, said: str, html: str | None, folder: str | None) -> None:
+        super().__init__(files["verdict.json"], notes, code, html, said)
         self.model: Model = Model(files["model.diagnosed.toml"], name="model.diagnosed.toml", folder=folder)
         rivals = sorted(name for name in files if "rival" in name and name.endswith(".toml"))
         self.rivals: list[Model] = [Model(files[name], name=name, folder=folder) for name in rivals]

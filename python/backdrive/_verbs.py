@@ -1,4 +1,4 @@
-"""The verbs of the command line as functions."""
+"""The verbs of the command line as functions: most call the function behind the verb, the rest the verb by its arguments."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import _frames, _toml
+from . import _backdrive, _frames, _toml
+from ._errors import UsageError
 from ._model import Model
 from ._results import Exported, Fit, Interrupted, Prediction, Report, Verdict, fields
 from ._work import INTERRUPTED, Progress, Work
 
 Path = str | os.PathLike[str]
+
+# Parts of a loop that `stability` swaps.
+_PARTS = ("master", "grip", "slave", "environment", "canceller", "canceller_grip", "high_pass", "hand", "edge_without", "sensors", "limits", "script")
 
 
 def _model_file(work: Work, model: Any, name: str = "model.toml") -> str:
@@ -54,16 +58,6 @@ def _grip(work: Work, grip: Any) -> str | None:
     return None if grip is None else _model_file(work, grip, "grip.toml")
 
 
-def _written(folder: str, report: bool) -> dict[str, str]:
-    """What a diagnosis has left in its folder, by name."""
-    files: dict[str, str] = {}
-    for name in os.listdir(folder) if os.path.isdir(folder) else []:
-        if name.endswith((".json", ".toml", ".csv")) or report and name == "report.html":
-            with open(os.path.join(folder, name), encoding="utf-8") as file:
-                files[name] = file.read()
-    return files
-
-
 def diagnose(
     recordings: Any,
     model: Path | Model | None = None,
@@ -101,20 +95,30 @@ def diagnose(
     Ctrl-C: its `verdict` is what was found until then. A second Ctrl-C does not wait for it.
     """
     with Work(progress) as work:
-        where = os.fspath(out) if out is not None else work.path("out")
         if joints is not None:
             joints = {name: dict(table) for name, table in joints.items()}
         more = {"initial": initial, "columns": columns, "joints": joints, **(settings or {})}
-        arguments = ["diagnose", *work.set(recordings, held_out, more), "--out", where]
-        arguments += _options({"model": None if model is None else _model_file(work, model), "grip": _grip(work, grip), "ignore_signal": _some(ignore)})
-        arguments += _options({"without": _some(without), "effects": effects, "effort": effort, "patience": patience, "no_report": not report})
-        try:
-            said = work.run(arguments)
-        except KeyboardInterrupt as stop:
-            files = _written(where, report)
-            whole = {"verdict.json", "model.diagnosed.toml"} <= files.keys()
-            raise Interrupted(Verdict(files, work.notes, INTERRUPTED, "", _folder_of(model)) if whole else None) from stop
-        return Verdict(_written(where, report), work.notes, work.code, said.partition("\nwrote ")[0].rstrip(), _folder_of(model))
+        answer = work.asked(
+            _backdrive.diagnose,
+            work.set(recordings, held_out, more),
+            model=None if model is None else _model_file(work, model),
+            grip=_grip(work, grip),
+            ignore_signal=_some(ignore),
+            without=_some(without),
+            effects=effects,
+            effort=effort,
+            seconds=patience,
+            out=out,
+            report=report,
+        )
+        files = {name: work.said(text) for name, text in answer.files}
+        html = None if answer.html is None else work.said(answer.html)
+        if answer.raised is None:
+            return Verdict(files, work.notes, work.code, work.said(answer.text), html, _folder_of(model))
+        if not isinstance(answer.raised, KeyboardInterrupt):
+            raise answer.raised
+        found = Verdict(files, answer.notes, INTERRUPTED, work.said(answer.text), html, _folder_of(model)) if files else None
+        raise Interrupted(found) from answer.raised
 
 
 def fit(
@@ -133,13 +137,17 @@ def fit(
 ) -> Fit:
     """Refits a model's numbers to recordings, its structure as it is; arguments as those of `diagnose`. Models of one axis only."""
     with Work(progress) as work:
-        out = work.path("fitted.toml")
-        given = work.set(recordings, held_out, {"initial": initial, "columns": columns, **(settings or {})})
-        arguments = ["fit", _model_file(work, model), *given, "--out", out, "--json"]
-        arguments += _options({"grip": _grip(work, grip), "ignore_signal": _some(ignore), "effort": effort, "patience": patience})
-        text = work.run(arguments)
-        with open(out, encoding="utf-8") as file:
-            return Fit(text, work.notes, work.code, Model(file.read(), name="fitted.toml", folder=_folder_of(model)))
+        answer = work.answer(
+            _backdrive.fit,
+            _model_file(work, model),
+            work.set(recordings, held_out, {"initial": initial, "columns": columns, **(settings or {})}),
+            grip=_grip(work, grip),
+            ignore_signal=_some(ignore),
+            effort=effort,
+            seconds=patience,
+        )
+        fitted = Model(dict(answer.files)["fitted.toml"], name="fitted.toml", folder=_folder_of(model))
+        return Fit(work.said(answer.json), work.notes, work.code, fitted)
 
 
 def simulate(
@@ -164,13 +172,21 @@ def simulate(
         set_file = None if columns is None else work.text_file("columns.toml", _toml.document({"fit": [], "columns": columns}))
         driven = work.file(drive, "recording")
         several = os.path.isdir(driven) or driven.endswith(".toml")
-        out = work.path("predicted" if several else "predicted.csv")
-        arguments = ["simulate", _model_file(work, model), driven, "--out", out, "--json", *_options({"grip": _grip(work, grip), "input": input})]
-        arguments += _options({"rate": rate, "substeps": substeps, "noise": noise, "columns": set_file})
-        text = work.run(arguments)
-        runs = fields(text)["runs"]
-        # What is said without the folder is found in it.
-        frames = {run["recording"]: _frames.read(os.path.join(work.folder, run["out"]), kind) for run in runs}
+        answer = work.answer(
+            _backdrive.simulate,
+            _model_file(work, model),
+            driven,
+            "predicted" if several else "predicted.csv",
+            grip=_grip(work, grip),
+            input=input,
+            rate=rate,
+            substeps=substeps,
+            noise=noise,
+            columns=set_file,
+        )
+        text = work.said(answer.json)
+        tables = dict(answer.tables)
+        frames = {run["recording"]: _frames.of_bytes(tables[run["out"]], kind) for run in fields(text)["runs"]}
         return Prediction(text, work.notes, work.code, frames)
 
 
@@ -193,17 +209,29 @@ def stability(
     roles: which topic or column is which signal: a file, or the same as dictionaries (docs/roles-example.toml).
     parts: other parts of the loop, as on the command line: `master="model.toml"`, `canceller="none"`.
     """
+    unknown = ", ".join(parts.keys() - set(_PARTS))
+    if unknown:
+        raise UsageError(f"{unknown}: is no part of a loop; there are {', '.join(_PARTS)}", 2)
     with Work(progress) as work:
-        arguments = ["stability", work.file(recording, "recording"), *_options({"gain": gain, "mu": mu, "lambda": lambda_, "roles": _roles(work, roles)})]
-        arguments += _options({"sweep": None if sweep is None else ":".join(_text(x) for x in sweep), "coupling": coupling})
-        arguments += _options({"grips": None if grips is None else ",".join(_text(x) for x in grips), **parts})
-        return _reported(work, arguments)
+        answer = work.answer(
+            _backdrive.stability,
+            work.file(recording, "recording"),
+            roles=_roles(work, roles),
+            gain=gain,
+            mu=mu,
+            lambda_=lambda_,
+            sweep=sweep,
+            grips=None if grips is None else list(grips),
+            coupling=coupling,
+            parts={name: parts.get(name) for name in _PARTS},
+        )
+        return _report(work, answer)
 
 
 def why(recording: Any, *, roles: Path | Mapping[str, Any] | None = None, progress: Progress = True) -> Report:
     """Asks the bag of a run, or with `roles` any recording, why its loop shakes and what would stop it."""
     with Work(progress) as work:
-        return _reported(work, ["why", work.file(recording, "recording"), *_options({"roles": _roles(work, roles)})])
+        return _report(work, work.answer(_backdrive.why, work.file(recording, "recording"), roles=_roles(work, roles)))
 
 
 def inspect(recordings: Any, *, rate: float | None = None, columns: Sequence[str] | None = None, time: str | None = None, progress: Progress = True) -> Report:
@@ -213,8 +241,8 @@ def inspect(recordings: Any, *, rate: float | None = None, columns: Sequence[str
     rate: rows per second of tables in which no column is the time, Hz. columns: headings of tables that have none. time: the column with the times.
     """
     with Work(progress) as work:
-        arguments = ["inspect", *work.files(recordings, "recording"), *_options({"rate": rate, "time": time})]
-        return _reported(work, arguments + _options({"columns": None if columns is None else ",".join(columns)}))
+        given = work.files(recordings, "recording")
+        return _report(work, work.answer(_backdrive.inspect, given, rate=rate, columns=None if columns is None else list(columns), time=time))
 
 
 def _roles(work: Work, roles: Any) -> str | None:
@@ -223,14 +251,10 @@ def _roles(work: Work, roles: Any) -> str | None:
     return work.text_file("roles.toml", _toml.document(roles))
 
 
-def _reported(work: Work, arguments: list[str]) -> Report:
-    page = work.path("report.html")
-    text = work.run([*arguments, "--html", page, "--json"])
-    html = None
-    if os.path.exists(page):
-        with open(page, encoding="utf-8") as file:
-            html = work.said(file.read())
-    return Report(text, work.notes, work.code, html, text.rstrip())
+def _report(work: Work, answer: Any) -> Report:
+    text = work.said(answer.json)
+    html = None if answer.html is None else work.said(answer.html)
+    return Report(text + "\n", work.notes, work.code, html, text)
 
 
 def load_bag(path: Path, *, topics: str | Sequence[str] = (), kind: str = "auto") -> Any:

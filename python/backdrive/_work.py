@@ -94,17 +94,37 @@ class Work:
 
     def run(self, arguments: Sequence[str]) -> str:
         """Calls the verb; what it prints."""
+        code, result, notes, error = self._watched(lambda progress: _backdrive.run(list(arguments), progress))
+        self._ended(code, notes, error)
+        return self.said(result)
+
+    def asked(self, verb: Callable[..., Any], *given: Any, **options: Any) -> Any:
+        """Calls a function behind a verb; its answer. What was raised while it worked is in there."""
+        answer = self._watched(lambda progress: verb(*given, **options, progress=progress))
+        if answer.raised is None:
+            self._ended(answer.code, answer.notes, answer.error)
+        return answer
+
+    def answer(self, verb: Callable[..., Any], *given: Any, **options: Any) -> Any:
+        """The same; what was raised while it worked is raised."""
+        answer = self.asked(verb, *given, **options)
+        if answer.raised is not None:
+            raise answer.raised
+        return answer
+
+    def _watched(self, call: Callable[[Any], Any]) -> Any:
         bar = Bar() if self.progress is True else None
         try:
-            code, result, notes, error = _backdrive.run(list(arguments), bar or (self.progress if callable(self.progress) else None))
+            return call(bar or (self.progress if callable(self.progress) else None))
         finally:
             if bar:
                 bar.close()
+
+    def _ended(self, code: int, notes: Sequence[str], error: str | None) -> None:
         self.notes += [self.said(note).removeprefix("note: ") for note in notes]
         self.code = code
         if error is not None and code != INTERRUPTED:
             raise raised(self.said(error), code)
-        return self.said(result)
 
     def file(self, given: Any, name: str) -> str:
         """One recording as a path."""

@@ -131,6 +131,21 @@ class Package(unittest.TestCase):
             self.assertTrue(drawn.axes)
             matplotlib.pyplot.close(drawn)
 
+    def test_a_folder_is_written_only_where_one_is_asked_for(self):
+        seen, unseen = self.seen_and_unseen(dict)
+        before = set(os.listdir("."))
+        verdict = backdrive.diagnose(seen, self.model, held_out=unseen, progress=False)
+        self.assertEqual(set(os.listdir(".")), before)
+        out = self.folder / "asked"
+        asked = backdrive.diagnose(seen, self.model, held_out=unseen, out=out, progress=False)
+        self.assertEqual((out / "verdict.json").read_text(), verdict.json)
+        self.assertEqual((out / "model.diagnosed.toml").read_text(), verdict.model.text)
+        self.assertIn("<html", (out / "report.html").read_text())
+        self.assertEqual(str(asked), str(verdict))
+        self.assertNotIn(os.path.join(tempfile.gettempdir(), "backdrive-"), verdict.html)
+        bare = backdrive.diagnose(seen, self.model, held_out=unseen, report=False, progress=False)
+        self.assertIsNone(bare.html)
+
     def test_every_sort_of_frame_gives_the_same(self):
         told = json.loads(self.program("fit", "model.toml", "set.toml", "--json"))
         # Of frames no command can be offered.
@@ -222,6 +237,13 @@ class Package(unittest.TestCase):
         self.assertEqual((caught.exception.file, caught.exception.line), ("recording.csv", 12))
         with self.assertRaises(backdrive.UsageError):
             backdrive.diagnose(frame, self.model, without="magic", progress=False)
+        for wrong in ({"patience": -1.0}, {"effort": 0.0}, {"effects": 9}, {"effects": -1}):
+            with self.assertRaises(backdrive.UsageError) as caught:
+                backdrive.diagnose(frame, self.model, progress=False, **wrong)
+            self.assertIn(next(iter(wrong)), str(caught.exception))
+        for wrong in ({"gain": -1.0}, {"coupling": "magic"}, {"hand": "magic"}, {"magic": 1}, {"sweep": (2.0, 1.0, 3)}):
+            with self.assertRaises(backdrive.UsageError):
+                backdrive.stability(self.folder / "sweep.csv", progress=False, **wrong)
         with self.assertRaises(backdrive.InputError):
             backdrive.fit({"t": [0.0, 1.0], "force": [1.0]}, self.model, progress=False)
         with self.assertRaises(backdrive.InputError):

@@ -2,6 +2,7 @@
 //!
 //! Without a set that holds recordings out, each is simulated by a fit that has not seen it. The last line is the mean over the joints.
 
+use backdrive_diagnosis::options::Options;
 use backdrive_plant::set::RecordingSet;
 use backdrive_servo::diagnose::diagnose;
 use backdrive_servo::problem::Problem;
@@ -31,7 +32,7 @@ fn table(set: &Path, model: &Path) -> Result<String, String> {
     let began = Instant::now();
     let set = RecordingSet::open(set).map_err(|e| e.to_string())?;
     let problem = Problem::open(&set, Some(model)).map_err(|e| e.to_string())?;
-    let found = diagnose(&problem, &[]).map_err(|e| e.to_string())?;
+    let found = diagnose(&problem, &Options::default(), None, &|_| ()).map_err(|e| e.to_string())?;
     let servo = found.verdict.servo.ok_or("no joint was diagnosed")?;
     let mut lines = vec![format!("{:<16} {:>21} {:>21} {:>21}", "", "the command", "second order", "diagnosed")];
     lines.push(format!(

@@ -7,21 +7,23 @@ use crate::physics::named;
 use crate::problem::{Joint, Problem};
 use crate::record::Record;
 use crate::run::free_runs;
-use crate::search::{Candidate, Claim, Found as Searched, scored, search_all};
+use crate::search::{Candidate, Claim, Found as JointSearch, scored, search_all};
 use crate::shared::shared;
 use crate::simulate::simulate;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::recordings::noise;
 use backdrive_diagnosis::verdict::{
-    Alternative, Estimate, Finding, HeldOut, MODEL_FILE, Parameter, RecordErrors, Remark, SCHEMA, ServoAnswer, ServoErrors, ServoPart,
-    Verdict, Word,
+    Alternative, Estimate, Finding, HeldOut, MODEL_FILE, Parameter, RecordErrors, Remark, SCHEMA, Searched, ServoAnswer, ServoErrors,
+    ServoPart, Verdict, Word,
 };
 use backdrive_plant::model::Model;
 use backdrive_plant::servo::{Number, Numbers, ServoJoint};
 use backdrive_signal::statistics::median;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 /// What was found of one joint.
 #[derive(Debug, Clone)]
@@ -29,7 +31,7 @@ pub struct Answer {
     /// The joint, by its place in the problem.
     pub joint: usize,
     /// The search.
-    pub found: Searched,
+    pub found: JointSearch,
     /// Errors of every judged record: its name, and of the command, the base and the diagnosed joint the nrmse and the mean absolute error.
     pub judged: Vec<Judged>,
     /// Whether those are held-out records.
@@ -66,11 +68,19 @@ const MOVES: f64 = 1e-3;
 /// What a rival that does nearly the same keeps beside the claim, however well the claim predicts: laws that simplify the same drive differ in what was left out of both.
 const DOUBT: f64 = 0.15;
 
-/// Diagnoses every joint.
+/// Diagnoses every joint. Once `stop` is set, or the patience that was asked for ends, the search ends with what was found until then, and the verdict
+/// states this; `report` hears what is being done.
 ///
 /// # Errors
 /// Where commands are none, or no joint can be used.
-pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoError> {
+pub fn diagnose(
+    problem: &Problem,
+    options: &Options,
+    stop: Option<&AtomicBool>,
+    report: &(dyn Fn(&str) + Sync),
+) -> Result<Found, ServoError> {
+    let limit = options.limit_as_asked(stop);
+    report("looking at the commands");
     let mut remarks = Vec::new();
     let mut used = Vec::new();
     for (index, joint) in problem.joints.iter().enumerate() {
@@ -100,7 +110,10 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
             (records, floor)
         })
         .collect();
-    let found = search_all(&records, without);
+    report("diagnosing the servo joints");
+    let found = search_all(&records, options, limit);
+    let cut_short = limit.is_over();
+    report("simulating from the commands");
     let answers: Vec<Answer> = used.iter().zip(found).map(|(index, found)| answer(*index, &problem.joints[*index], found)).collect();
     let answers = from_commands_alone(problem, answers)?;
     let mut model = problem.model.clone();
@@ -110,8 +123,13 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
         model.servos.retain(|s| s.joint != servo.joint);
         model.servos.push(servo);
     }
-    let verdict = verdict(problem, &answers, remarks);
-    Ok(Found { verdict, model, answers, notes: problem.notes.clone() })
+    let verdict = verdict(problem, &answers, remarks, cut_short);
+    let mut notes = problem.notes.clone();
+    if cut_short {
+        let by = if limit.was_stopped() { "interrupted" } else { "cut off by the clock (--patience)" };
+        notes.push(format!("the search was {by}: what else is missing was not looked for to the end"));
+    }
+    Ok(Found { verdict, model, answers, notes })
 }
 
 /// Parameters of a fit as a file has them: seven digits.
@@ -123,7 +141,7 @@ fn rounded(candidate: &Candidate) -> Numbers {
     numbers
 }
 
-fn answer(index: usize, joint: &Joint, found: Searched) -> Answer {
+fn answer(index: usize, joint: &Joint, found: JointSearch) -> Answer {
     let records: Vec<&Record> = joint.fit.iter().filter(|r| r.t.len() > 20).collect();
     let is_held_out = !joint.held_out.is_empty();
     let judged = if is_held_out {
@@ -143,7 +161,7 @@ fn answer(index: usize, joint: &Joint, found: Searched) -> Answer {
 
 /// Re-simulation of held-out recordings with all joints where their own free runs bring them, not where they were recorded.
 fn from_commands_alone(problem: &Problem, mut answers: Vec<Answer>) -> Result<Vec<Answer>, ServoError> {
-    let numbers = |of: &dyn Fn(&Searched) -> Numbers| -> Vec<Option<Numbers>> {
+    let numbers = |of: &dyn Fn(&JointSearch) -> Numbers| -> Vec<Option<Numbers>> {
         (0..problem.joints.len()).map(|j| answers.iter().find(|a| a.joint == j).map(|a| of(&a.found))).collect()
     };
     let best = numbers(&|found| found.best.fit.numbers);
@@ -172,7 +190,7 @@ pub(crate) fn floor(records: &[&Record]) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(1e-6)
 }
 
-fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>) -> Verdict {
+fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>, cut_short: bool) -> Verdict {
     let mut findings = Vec::new();
     let mut joints = Vec::new();
     let mut per_record = Vec::new();
@@ -218,6 +236,7 @@ fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>) -> Verdict
     let word = match findings.first() {
         Some(first) if first.confidence < 0.6 => Word::Ambiguous,
         Some(_) => Word::Missing,
+        None if cut_short => Word::CannotTell,
         None if poor => Word::Unexplained,
         None => Word::NothingMissing,
     };
@@ -238,7 +257,7 @@ fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>) -> Verdict
         rival_models: Vec::new(),
         next_experiment: None,
         detectable: None,
-        searched: None,
+        searched: cut_short.then_some(Searched { steps: 0, exhausted: false, cut_short }),
         arm: None,
         servo: Some(Box::new(servo)),
     }
@@ -299,7 +318,7 @@ pub(crate) fn numbers_of(candidate: &Candidate) -> BTreeMap<String, Estimate> {
 }
 
 /// The proportional gain, where gravity with known masses determines it.
-fn gain_of(joint: &Joint, found: &Searched) -> Option<Estimate> {
+fn gain_of(joint: &Joint, found: &JointSearch) -> Option<Estimate> {
     let best = &found.best;
     if !joint.is_weighed || !best.added.contains(&"gravity") || best.added.contains(&"gain") || best.added.contains(&"payload") {
         return None;
@@ -343,7 +362,7 @@ pub fn place(joint: &str, physics: &str) -> Place {
     }
 }
 
-fn finding(joint: &Joint, found: &Searched, claim: &Claim, gain: Option<&Estimate>) -> Finding {
+fn finding(joint: &Joint, found: &JointSearch, claim: &Claim, gain: Option<&Estimate>) -> Finding {
     let normal = Normal::standard();
     let sure = |z: f64| normal.cdf(z.clamp(-8.0, 8.0));
     // What is as good in its place takes its share.

@@ -4,6 +4,8 @@ use crate::fit::{BLOCKS, Fit, Problem};
 use crate::physics::{ALL, BASE, Physics, Sizes, named};
 use crate::record::Record;
 use backdrive_diagnosis::belief::predictive::{Gain, gain};
+use backdrive_diagnosis::options::Options;
+use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_plant::servo::{Number, Numbers};
 use backdrive_signal::statistics::{deviation, rms};
 use rayon::prelude::*;
@@ -102,14 +104,14 @@ pub fn sizes(records: &[&Record]) -> Sizes {
 }
 
 /// The first search of one joint. `floor`: what the position sensor resolves, rad.
-fn begin<'a>(records: &[&'a Record], floor: f64, without: &'a [String]) -> (Searcher<'a>, Candidate, Candidate) {
+fn begin<'a>(records: &[&'a Record], floor: f64, options: &'a Options, limit: Limit<'a>) -> (Searcher<'a>, Candidate, Candidate) {
     let size = sizes(records);
     let problem = Problem::new(records.to_vec(), size.lag.max(floor));
     let free: Vec<Number> = BASE.to_vec();
     let first = starts(records).into_iter().map(|start| problem.fit(&free, &start, FULL, None));
     let base = first.min_by(|a, b| a.cost.total_cmp(&b.cost));
     let base = base.unwrap_or_else(|| problem.fit(&free, &Numbers::default(), 0, None));
-    let mut searcher = Searcher { problem, size, floor, tried: Vec::new(), excluded: without };
+    let mut searcher = Searcher { problem, size, floor, tried: Vec::new(), options, limit };
     searcher.rescale(&base.numbers);
     let base = searcher.candidate(Vec::new(), &base.numbers);
     let best = searcher.onward(base.clone());
@@ -117,10 +119,10 @@ fn begin<'a>(records: &[&'a Record], floor: f64, without: &'a [String]) -> (Sear
 }
 
 /// Examines each joint again with the effects of the others: joints of one arm often have the same servos. An effect that a joint takes over has to predict
-/// its own held-out recordings.
-pub fn search_all(joints: &[(Vec<&Record>, f64)], without: &[String]) -> Vec<Found> {
+/// its own held-out recordings. What ends it from outside keeps what every joint has by then.
+pub fn search_all(joints: &[(Vec<&Record>, f64)], options: &Options, limit: Limit) -> Vec<Found> {
     let mut all: Vec<(Searcher, Candidate, Candidate)> =
-        joints.par_iter().map(|(records, floor)| begin(records, *floor, without)).collect();
+        joints.par_iter().map(|(records, floor)| begin(records, *floor, options, limit)).collect();
     let first: Vec<Candidate> = all.iter().map(|(_, _, best)| best.clone()).collect();
     all.par_iter_mut()
         .enumerate()
@@ -178,8 +180,8 @@ struct Searcher<'a> {
     size: Sizes,
     floor: f64,
     tried: Vec<Tried>,
-    /// Effects that are not considered.
-    excluded: &'a [String],
+    options: &'a Options,
+    limit: Limit<'a>,
 }
 
 impl Searcher<'_> {
@@ -208,6 +210,9 @@ impl Searcher<'_> {
 
     /// The structure and the parameters of another joint, where they predict this one better; what is particular to a joint stays its own.
     fn adopted(&mut self, best: &Candidate, other: &Candidate) -> Candidate {
+        if self.limit.is_over() {
+            return best.clone();
+        }
         let mut added = best.added.clone();
         added.extend(other.added.iter().filter(|name| !best.added.contains(name)));
         let mut start = other.fit.numbers;
@@ -226,6 +231,9 @@ impl Searcher<'_> {
         kept.extend(more);
         if self.size.weight < 1e-6 {
             kept.retain(|name| *name != "gravity");
+        }
+        if !self.are_allowed(kept.len()) {
+            return best.clone();
         }
         let candidate = self.candidate(kept, &start);
         if self.is_no_worse(best, &candidate) { candidate } else { best.clone() }
@@ -257,7 +265,7 @@ impl Searcher<'_> {
         // Friction by load is more of dry friction, not another word for it.
         let is_early = physics.name == "load_friction" && !added.contains(&"coulomb") && !added.contains(&"dead_band");
         let weightless = physics.name == "gravity" && self.size.weight < 1e-6;
-        !is_there && fulfilled && !is_early && !weightless && !self.excluded.iter().any(|name| name == physics.name)
+        !is_there && fulfilled && !is_early && !weightless && !self.options.without.iter().any(|name| name == physics.name)
     }
 
     /// Whether one predicts held-out recordings better than another beyond chance: in most segments, or by much in some recordings and by little worse in
@@ -307,9 +315,14 @@ impl Searcher<'_> {
                 .collect::<Vec<_>>()
         });
         match stage {
-            0 => singles.chain(pairs).collect(),
+            0 => singles.chain(pairs).filter(|change| self.are_allowed(best.added.len() + change.adds.len())).collect(),
             _ => swaps.collect(),
         }
+    }
+
+    /// Whether as many effects may be missing at once.
+    fn are_allowed(&self, effects: usize) -> bool {
+        self.options.effects.is_none_or(|most| effects <= most)
     }
 
     /// The structure after a move, and where its fits start.
@@ -338,6 +351,9 @@ impl Searcher<'_> {
         let mut screened: Vec<(usize, Vec<&'static str>, Fit)> = (0..moves.len())
             .into_par_iter()
             .filter_map(|index| {
+                if self.limit.is_over() {
+                    return None;
+                }
                 let (added, starts) = self.moved(best, &moves[index]);
                 let free = screened(&moves[index]);
                 let fits = starts.iter().map(|s| self.problem.fit(&free, s, SCREEN, None));
@@ -348,6 +364,9 @@ impl Searcher<'_> {
         screened.sort_by(|a, b| a.2.cost.total_cmp(&b.2.cost));
         let mut taken: Option<(Candidate, f64, usize)> = None;
         for (index, added, fit) in screened.into_iter().take(FINALISTS) {
+            if self.limit.is_over() {
+                break;
+            }
             let change = &moves[index];
             let candidate = self.candidate(added, &fit.numbers);
             let gain = self.gain(best, &candidate);

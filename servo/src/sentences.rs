@@ -25,6 +25,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> S
     };
     let joints: Vec<String> = servo.joints.iter().filter_map(|j| of(&j.joint)).collect();
     match word {
+        Word::CannotTell => "the search ended before it found what delay, second order and offset do not explain".to_string(),
         Word::NothingMissing => "delay, second order and offset explain the response of every joint to its commands".to_string(),
         Word::Unexplained => {
             "delay, second order and offset do not explain the response of the joints, and no known effect explains more".to_string()

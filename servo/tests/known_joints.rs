@@ -1,11 +1,15 @@
 //! Joints whose truth is known: what is found of them, what is not claimed, and what is refused.
 
+use backdrive_diagnosis::options::Options;
+use backdrive_diagnosis::verdict::Word;
 use backdrive_plant::model::Model;
 use backdrive_plant::servo::{Number, Numbers};
 use backdrive_servo::diagnose::diagnose;
 use backdrive_servo::problem::{Joint, Problem};
 use backdrive_servo::record::Record;
 use backdrive_servo::simulate::simulate;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 const STEP: f64 = 2.0 * std::f64::consts::PI / 4096.0;
 
@@ -52,7 +56,7 @@ fn problem(joint: Joint) -> Problem {
 
 #[test]
 fn a_joint_without_anything_has_no_finding() {
-    let found = diagnose(&problem(joint(&base())), &[]).unwrap();
+    let found = diagnose(&problem(joint(&base())), &Options::default(), None, &|_| ()).unwrap();
     let named: Vec<&str> = found.verdict.findings.iter().map(|f| f.physics.as_str()).collect();
     assert!(named.is_empty(), "{named:?}");
     let numbers = found.model.servos[0].numbers;
@@ -65,7 +69,7 @@ fn a_joint_without_anything_has_no_finding() {
 fn dry_friction_is_found_with_its_size_and_its_rival_is_named() {
     let mut truth = base();
     truth[Number::Friction] = 0.02;
-    let found = diagnose(&problem(joint(&truth)), &[]).unwrap();
+    let found = diagnose(&problem(joint(&truth)), &Options::default(), None, &|_| ()).unwrap();
     let first = &found.verdict.findings[0];
     assert!(first.physics == "coulomb" && first.confidence < 0.9, "{first:?}");
     assert!((found.model.servos[0].numbers[Number::Friction] - 0.02).abs() < 0.003, "{:?}", found.model.servos[0].numbers);
@@ -73,6 +77,19 @@ fn dry_friction_is_found_with_its_size_and_its_rival_is_named() {
     assert!(after.diagnosed.unwrap() < 0.5 * after.refit.unwrap(), "{after:?}");
     let text = found.model.to_toml();
     assert_eq!(Model::from_toml(&text, "model").unwrap().servos, found.model.servos, "{text}");
+}
+
+#[test]
+fn a_search_that_is_cut_short_says_so_and_gives_no_green_answer() {
+    let mut truth = base();
+    truth[Number::Friction] = 0.02;
+    let stop = AtomicBool::new(true);
+    let impatient = Options { patience: Some(Duration::ZERO), ..Options::default() };
+    for (options, stop, why) in [(Options::default(), Some(&stop), "interrupted"), (impatient, None, "--patience")] {
+        let found = diagnose(&problem(joint(&truth)), &options, stop, &|_| ()).unwrap();
+        assert_eq!(found.verdict.word, Word::CannotTell);
+        assert!(found.verdict.searched.is_some_and(|s| s.cut_short) && found.notes.iter().any(|n| n.contains(why)));
+    }
 }
 
 #[test]
@@ -101,7 +118,7 @@ fn a_motion_that_repeats_itself_is_not_taken_for_a_late_one() {
 fn refused(change: impl Fn(&mut Record)) -> String {
     let mut joint = joint(&base());
     joint.fit.iter_mut().chain(&mut joint.held_out).for_each(change);
-    diagnose(&problem(joint), &[]).map(|f| f.verdict.sentence).unwrap_err().to_string()
+    diagnose(&problem(joint), &Options::default(), None, &|_| ()).map(|f| f.verdict.sentence).unwrap_err().to_string()
 }
 
 #[test]

@@ -61,8 +61,12 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     audit::usable(&problem).map_err(SetError::new)?;
     let inputs = [model.map(Path::to_path_buf).or_else(|| set.model.clone()), grip.map(Path::to_path_buf)];
     let files = inputs.into_iter().flatten().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-    let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
-    Ok(Opened { problem, name, notes, files })
+    Ok(Opened { problem, name: name_of(paths), notes, files })
+}
+
+/// The set or the recording, for titles.
+pub fn name_of(paths: &[PathBuf]) -> String {
+    paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()))
 }
 
 /// The set that paths name, and whether it states itself what is fitted.

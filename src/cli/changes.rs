@@ -50,23 +50,6 @@ pub struct SwappedParts {
 }
 
 impl SwappedParts {
-    /// The same as words of a command line.
-    pub fn words(&self) -> Vec<String> {
-        let mut words = Words::default();
-        words.file("--master", self.master.as_ref());
-        words.file("--grip", self.grip.as_ref());
-        words.file("--slave", self.slave.as_ref());
-        words.file("--environment", self.environment.as_ref());
-        words.file("--canceller", self.canceller.as_ref());
-        words.file("--canceller-grip", self.canceller_grip.as_ref());
-        words.value("--high-pass", self.high_pass);
-        words.value("--hand", self.hand.map(|choice| choice.word().replace('_', "-")));
-        words.value("--edge-without", self.edge_without);
-        words.value("--sensors", self.sensors.map(|choice| choice.word().replace('_', "-")));
-        words.value("--limits", self.limits.map(|choice| choice.word().replace('_', "-")));
-        words.0
-    }
-
     /// As the graph's reader takes them.
     pub fn overrides(&self) -> Overrides {
         Overrides {
@@ -84,6 +67,23 @@ impl SwappedParts {
             ..Overrides::default()
         }
     }
+}
+
+/// Swapped parts as words of a command line.
+pub fn words_of(parts: &Overrides) -> Vec<String> {
+    let mut words = Words::default();
+    words.file("--master", parts.master.as_ref());
+    words.file("--grip", parts.grip.as_ref());
+    words.file("--slave", parts.slave.as_ref());
+    words.file("--environment", parts.environment.as_ref());
+    words.file("--canceller", parts.canceller.as_ref());
+    words.file("--canceller-grip", parts.canceller_grip.as_ref());
+    words.value("--high-pass", parts.high_pass_hz);
+    words.value("--hand", parts.hand.map(|choice| choice.word().replace('_', "-")));
+    words.value("--edge-without", parts.edge_without);
+    words.value("--sensors", parts.sensors.map(|choice| choice.word().replace('_', "-")));
+    words.value("--limits", parts.limits.map(|choice| choice.word().replace('_', "-")));
+    words.0
 }
 
 /// Options with their values, as words of a command line.
@@ -198,7 +198,7 @@ mod tests {
         };
         let parts = parsed(&words);
         // Every option of the parts stands above.
-        let own = parts.words();
+        let own = super::words_of(&parts.overrides());
         assert_eq!(own, words);
         let again = parsed(&own.iter().map(String::as_str).collect::<Vec<_>>());
         assert_eq!(again.overrides(), parts.overrides());

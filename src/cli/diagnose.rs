@@ -1,9 +1,7 @@
 //! Options of `backdrive diagnose`.
 
 use super::values::positive;
-use backdrive_diagnosis::arms::physics::ALL as OF_ARMS;
-use backdrive_diagnosis::physics::{PHYSICS, physics_named};
-use backdrive_servo::physics::ALL as OF_SERVOS;
+use backdrive_answers::checks::effect;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -41,7 +39,7 @@ pub struct Diagnose {
     #[arg(long, value_name = "NAME")]
     pub ignore_signal: Vec<String>,
     /// An effect to exclude, together with all that contain it as a special case; may be given several times.
-    #[arg(long, value_name = "KIND", value_parser = physics)]
+    #[arg(long, value_name = "KIND", value_parser = effect)]
     pub without: Vec<String>,
     /// Largest number of missing effects; more take more time. Without this 3, for an arm 8
     /// in addition to constant torque, dry and viscous friction and armature.
@@ -51,7 +49,8 @@ pub struct Diagnose {
     /// on every machine. For an arm it has no effect: everything is tried.
     #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
     pub effort: Option<f64>,
-    /// Time limit, s; without this 600 s. If it ends the search, the verdict may depend on the machine and reports that. Not for an arm.
+    /// Time limit, s; without this 600 s, and none for an arm or servo joints. If it ends the search, the verdict may depend on the machine and reports
+    /// that.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     pub patience: Option<f64>,
     /// Print all candidates of the search, their cost and why they were rejected.
@@ -66,19 +65,4 @@ pub struct Diagnose {
     /// Write no report.
     #[arg(long, conflicts_with = "html")]
     pub no_report: bool,
-}
-
-fn physics(name: &str) -> Result<String, String> {
-    if let Some(known) = physics_named(name) {
-        return Ok(known.name.to_string());
-    }
-    let of_arms = || OF_ARMS.iter().map(|p| p.facts().name);
-    let of_servos = || OF_SERVOS.iter().map(|p| p.name);
-    if of_arms().chain(of_servos()).any(|known| known == name) {
-        return Ok(name.to_string());
-    }
-    let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
-    let more = |names: Vec<&'static str>| names.into_iter().filter(|n| !known.contains(n)).collect::<Vec<_>>().join(", ");
-    let (arms, servos) = (more(of_arms().collect()), more(of_servos().collect()));
-    Err(format!("no such effect; there are {}; for arms also {arms}; for position servos also {servos}", known.join(", ")))
 }

@@ -34,7 +34,7 @@ pub struct Stability {
     #[arg(long, value_name = "FROM:TO:COUNT", value_parser = gains)]
     pub sweep: Option<Gains>,
     /// Factors on the stiffness and damping of the grip for which the answer is given.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 0.85, 1.0, 1.15, 1.3])]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = GRIPS)]
     pub grips: Vec<f64>,
     /// A graph file whose operator is used instead of the recorded hand.
     #[arg(long, value_name = "GRAPH")]
@@ -56,6 +56,9 @@ pub struct Stability {
     pub parts: SwappedParts,
 }
 
+/// Factors on stiffness and damping of the grip, where nothing else is asked.
+pub const GRIPS: [f64; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
+
 /// Gains of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains(pub Vec<f64>);
@@ -67,7 +70,21 @@ fn gains(text: &str) -> Result<Gains, String> {
     let parts: Vec<&str> = text.split(':').collect();
     let [from, to, count] = parts.as_slice() else { return Err("must be FROM:TO:COUNT, such as 0.1:50:200".to_string()) };
     let (from, to) = (positive(from)?, positive(to)?);
-    let count: usize = count.parse().ok().filter(|n| (1..=MOST_GAINS).contains(n)).ok_or(format!("COUNT must be 1 to {MOST_GAINS}"))?;
+    let count: usize = count.parse().map_err(|_| format!("COUNT must be 1 to {MOST_GAINS}"))?;
+    spaced(from, to, count)
+}
+
+/// So many gains from one to another, evenly spaced in their logarithm.
+///
+/// # Errors
+/// There are too many or none, or one of the two is no gain.
+pub fn spaced(from: f64, to: f64, count: usize) -> Result<Gains, String> {
+    if !(1..=MOST_GAINS).contains(&count) {
+        return Err(format!("COUNT must be 1 to {MOST_GAINS}"));
+    }
+    if !(from.is_finite() && to.is_finite() && from > 0.0) {
+        return Err("FROM and TO must be above 0".to_string());
+    }
     if to < from {
         return Err("FROM must not be above TO".to_string());
     }

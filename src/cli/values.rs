@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// s, how long a search may take on the clock where nothing else is said: the library's own.
 pub fn patience() -> f64 {
-    backdrive_diagnosis::search::Settings::default().patience.as_secs_f64()
+    backdrive_diagnosis::options::Options::usual_patience().as_secs_f64()
 }
 
 /// A finite number.

@@ -1,12 +1,14 @@
 //! What to do after a diagnosis, with the commands that do it.
 
 use crate::offered::{Builder, Offered, Step, plain};
+use backdrive_answers::found::{Diagnosed, Found};
+use backdrive_answers::sentences::next_experiment;
 use backdrive_bags::Reader;
+use backdrive_diagnosis::arms::sentences::unexplained;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::verdict::{MODEL_FILE, Word};
+use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word};
 use backdrive_nodes::graph::{NodeKind, Overrides, Settings};
-use backdrive_pages::diagnose::sentences::next_experiment;
 use backdrive_report::percent;
 use backdrive_stability::summary::graph_of;
 use std::path::{Path, PathBuf};
@@ -14,8 +16,17 @@ use std::path::{Path, PathBuf};
 /// The graph on which a canceller is tried, where it is at hand.
 const CONTACT: &str = "launch/contact.toml";
 
-/// What to do, the most useful first. `out` is the folder of the model that was written, `files` are the recordings.
-pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
+/// What to do, the most useful first, with commands to copy. `out` is the folder of the model that was written.
+pub fn next(found: &Found, out: &Path) -> Vec<Step> {
+    match &found.device {
+        Diagnosed::OneAxis(diagnosis) => of_one_axis(diagnosis, out, &found.read),
+        Diagnosed::Arm(both) => of_arm(&both.1.verdict, out),
+        Diagnosed::Servo(both) => of_servo(both.1.verdict.word, out),
+    }
+}
+
+/// The same for a device of one axis; `files` are those that were read.
+fn of_one_axis(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
     let held = &found.verdict.held_out;
     let model = out.join(MODEL_FILE);
     // A canceller takes the model of a master: one that states where it is held, pushed and read.
@@ -55,6 +66,49 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
         steps.push(Step::new(text, [again("--effort", 1.0)]));
     }
     steps
+}
+
+/// The same for an arm.
+fn of_arm(verdict: &Verdict, out: &Path) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let model = out.join(MODEL_FILE);
+    let (name, export) = (model.display(), Builder::verb("export").reads(&model).option("--to", "urdf"));
+    let use_it = || [export.option_writes("--out", Path::new("arm.diagnosed.urdf")).build()];
+    match verdict.word {
+        Word::Missing | Word::Parameters => steps.push(Step::new(
+            format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
+            use_it(),
+        )),
+        Word::Ambiguous => steps
+            .push(Step::new(format!("{name} may be used, but the first effect could be a different one: see the table below."), use_it())),
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs show no missing effect.")),
+        Word::Unexplained => steps.push(Step::said(
+            "Do not use a law yet: see below when and where the residual appears, and first check the sensors of the joints named there.",
+        )),
+        Word::CannotTell => {}
+    }
+    if verdict.word != Word::Unexplained {
+        for joint in verdict.arm.iter().flat_map(|a| &a.joints) {
+            if let Some(open) = unexplained(joint) {
+                steps.push(Step::said(format!("Check the residual {open}.")));
+            }
+        }
+    }
+    if let Some(next) = &verdict.next_experiment {
+        steps.push(Step::said(format!("Record next: {}", next.sentence())));
+    }
+    for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
+        steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));
+    }
+    steps
+}
+
+/// The same for servo joints, where the model may be used.
+fn of_servo(word: Word, out: &Path) -> Vec<Step> {
+    let model = out.join(MODEL_FILE);
+    let usable = matches!(word, Word::Missing | Word::Parameters | Word::NothingMissing);
+    let show = || Builder::verb("model show").reads(&model).build();
+    usable.then(|| Step::new(format!("Use {}; this shows its parameters:", model.display()), [show()])).into_iter().collect()
 }
 
 /// The contact task with the model in its canceller.

@@ -1,12 +1,13 @@
 //! What to do after an answer about stability, with the commands that do it.
 
-use crate::cli;
+use crate::cli::words_of;
 use crate::offered::{Builder, Offered, Step, plain};
 use backdrive_bags::free;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_pages::stability::spelled;
 use backdrive_report::{number, percent};
 use backdrive_runs::source::runs_from_its_bag;
+use backdrive_stability::asked::Options;
 use backdrive_stability::verdict::{Answer, Word};
 use std::path::Path;
 
@@ -14,7 +15,7 @@ use std::path::Path;
 const SAFE: f64 = 2.0;
 
 /// What to do, the most useful first. `asked` is the graph that was asked about, of a bag of ours.
-pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> Vec<Step> {
+pub fn next(found: &Answer, options: &Options, asked: Option<&Graph>) -> Vec<Step> {
     let gain = found.gain.product();
     let lower = |limit: f64| found.critical_gain_ci95.map_or(limit, |ci| ci.0.min(limit)) / SAFE;
     let mut steps = Vec::new();
@@ -62,11 +63,11 @@ pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> 
 }
 
 /// The same loop at another gain: a replay where the bag has a graph and its own hand, else the same question.
-fn at(found: &Answer, options: &cli::Stability, asked: Option<&Graph>, gain: f64, page: &str) -> Option<Offered> {
+fn at(found: &Answer, options: &Options, asked: Option<&Graph>, gain: f64, page: &str) -> Option<Offered> {
     let lambda = plain(gain / found.gain.mu);
     if asked.is_some() && options.script.is_none() && options.roles.is_none() {
-        let replay = Builder::verb("replay").reads(&options.recording).words(options.parts.words());
-        let replay = options.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law));
+        let replay = Builder::verb("replay").reads(&options.recording).words(words_of(&options.changes));
+        let replay = options.changes.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law));
         let replay = options.mu.iter().fold(replay, |replay, mu| replay.option("--mu", mu));
         return replay.option("--lambda", lambda).option_writes("--html", Path::new(page)).build();
     }
@@ -85,7 +86,7 @@ fn asked_again(page: &str) -> Builder {
 }
 
 /// A canceller with the master's model where there is none, a better model where there is one.
-fn cancelled(options: &cli::Stability, asked: Option<&Graph>) -> Option<Step> {
+fn cancelled(options: &Options, asked: Option<&Graph>) -> Option<Step> {
     let graph = asked?;
     let Settings::Canceller(files, ..) = &graph.node_of(NodeKind::Canceller)?.settings else { return None };
     if files.model.is_some() {
@@ -98,7 +99,7 @@ fn cancelled(options: &cli::Stability, asked: Option<&Graph>) -> Option<Step> {
 }
 
 /// A bag of the same loop with a dither, and the question of it.
-fn dithered(options: &cli::Stability, asked: Option<&Graph>, advice: &str) -> Vec<Option<Offered>> {
+fn dithered(options: &Options, asked: Option<&Graph>, advice: &str) -> Vec<Option<Offered>> {
     let excitation = advice.split_once("--dither ").and_then(|(_, rest)| rest.split_whitespace().next()).map(|w| w.trim_end_matches(','));
     let Some(excitation) = excitation else { return Vec::new() };
     if options.roles.is_some() || !asked.is_some_and(runs_from_its_bag) {
@@ -110,7 +111,7 @@ fn dithered(options: &cli::Stability, asked: Option<&Graph>, advice: &str) -> Ve
     vec![run.build(), Builder::verb("stability").reads_later(&bag).build()]
 }
 
-fn why(options: &cli::Stability) -> Option<Offered> {
+fn why(options: &Options) -> Option<Offered> {
     let why = Builder::verb("why").reads(&options.recording);
     let why = options.roles.iter().fold(why, |why, roles| why.option_reads("--roles", roles));
     why.option_writes("--html", Path::new("why.html")).build()

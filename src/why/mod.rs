@@ -9,65 +9,103 @@ use crate::{cli, interrupt, output, progress};
 use backdrive_bags::Reader;
 use backdrive_nodes::graph::Overrides;
 use backdrive_pages::why::page;
+use backdrive_report::Page;
 use backdrive_runs::source::runs_from_its_bag;
 use backdrive_stability::summary::graph_of;
 use backdrive_why::answer::{Answer, WhyError};
 use backdrive_why::happening::Happening;
 use backdrive_why::recording::Recording;
 use next::{Asked, commands, next};
-use std::sync::atomic::Ordering;
+use serde_json::Value;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use text::text;
 
 /// Answers.
 pub fn why(options: &cli::Why) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
-    let path = &options.recording;
     for file in options.html.iter().chain(&options.out) {
         output::writable(file)?;
     }
-    let asked = progress::busy(&format!("reading {}", path.display()), || Recording::read(path, options.roles.as_deref()))?;
-    let found = progress::about(EXPECTED, |report| {
-        asked.why(report, &cancel).map_err(|e| match e {
-            WhyError::Loop(_) if cancel.load(Ordering::SeqCst) => Failure { code: code::INTERRUPTED, message: "stopped".to_string() },
-            other => Failure::input(format!("{}: {other}", path.display())),
-        })
-    })?;
-    let (session, graph) = (&asked.session, asked.graph());
-    let written = match (&options.out, &found.master) {
-        (Some(out), Some(model)) => {
-            output::file(out, model)?;
-            output::note(format_args!("wrote {}", out.display()));
-            Some(out.as_path())
-        }
-        (Some(out), None) => {
-            output::note(format_args!("{}: not written, because the master behaves as the graph states", out.display()));
-            None
-        }
-        (None, _) => None,
-    };
-    let takes = |changes: &Overrides| Reader::open(path).is_ok_and(|reader| graph_of(&reader, changes).is_ok());
-    let offer = Asked {
-        recording: path,
-        roles: options.roles.as_deref(),
-        master: written,
-        takes: &takes,
-        runs: graph.is_some_and(runs_from_its_bag),
-    };
-    let steps = next(&found, &offer);
+    let found = Explained::of(&options.recording, options.roles.as_deref(), options.out.as_deref(), &cancel)?;
     if options.json {
-        let mut all = serde_json::to_value(&found).map_err(Failure::input)?;
-        all["next"] = serde_json::to_value(&steps).map_err(Failure::input)?;
-        output::json(&all)?;
+        output::json(&found.json()?)?;
     } else {
-        output::line(text(&found, &steps))?;
+        output::line(text(&found.answer, &found.steps))?;
     }
     if let Some(html) = &options.html {
-        let tries: Vec<Step> = found.remedies.iter().map(|remedy| Step::new("", commands(&found, &offer, remedy))).collect();
-        output::page(html, page(&found, session, &tries, &steps))?;
+        output::page(html, found.page())?;
         output::note(format_args!("wrote {}", html.display()));
     }
-    Ok(exit_code(&found))
+    Ok(found.code())
+}
+
+/// An answer with what it is about, and what to do.
+pub struct Explained {
+    recording: Recording,
+    answer: Answer,
+    tries: Vec<Step>,
+    steps: Vec<Step>,
+}
+
+impl Explained {
+    /// Asks a recording, a bag of a run or with `roles` any other. A master that differs from the graph is written to `out`, where that is given.
+    ///
+    /// # Errors
+    /// The recording cannot be read or judged, the work is interrupted, or `out` cannot be written.
+    pub fn of(path: &Path, roles: Option<&Path>, out: Option<&Path>, cancel: &Arc<AtomicBool>) -> Result<Explained, Failure> {
+        let recording = progress::busy(&format!("reading {}", path.display()), || Recording::read(path, roles))?;
+        let answer = progress::about(EXPECTED, |report| {
+            recording.why(report, cancel).map_err(|e| match e {
+                WhyError::Loop(_) if cancel.load(Ordering::SeqCst) => Failure { code: code::INTERRUPTED, message: "stopped".to_string() },
+                other => Failure::input(format!("{}: {other}", path.display())),
+            })
+        })?;
+        let master = match (out, &answer.master) {
+            (Some(out), Some(model)) => {
+                output::file(out, model)?;
+                output::note(format_args!("wrote {}", out.display()));
+                Some(out)
+            }
+            (Some(out), None) => {
+                output::note(format_args!("{}: not written, because the master behaves as the graph states", out.display()));
+                None
+            }
+            (None, _) => None,
+        };
+        let takes = |changes: &Overrides| Reader::open(path).is_ok_and(|reader| graph_of(&reader, changes).is_ok());
+        let offer = Asked { recording: path, roles, master, takes: &takes, runs: recording.graph().is_some_and(runs_from_its_bag) };
+        let steps = next(&answer, &offer);
+        let tries = answer.remedies.iter().map(|remedy| Step::new("", commands(&answer, &offer, remedy))).collect();
+        Ok(Explained { recording, answer, tries, steps })
+    }
+
+    /// The result for programs.
+    ///
+    /// # Errors
+    /// It cannot be written as JSON.
+    pub fn json(&self) -> Result<Value, Failure> {
+        let mut all = serde_json::to_value(&self.answer).map_err(Failure::input)?;
+        all["next"] = serde_json::to_value(&self.steps).map_err(Failure::input)?;
+        Ok(all)
+    }
+
+    /// The page.
+    fn page(&self) -> Page {
+        page(&self.answer, &self.recording.session, &self.tries, &self.steps)
+    }
+
+    /// The text of the page.
+    pub fn html(&self) -> String {
+        output::html(self.page())
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        exit_code(&self.answer)
+    }
 }
 
 /// About how long an answer takes that needs a diagnosis.

@@ -1,17 +1,20 @@
 //! A diagnosis like that of `backdrive diagnose`, from a set whose recordings lie in another folder.
 
 use crate::{Context, StudyError};
-use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
+use backdrive::diagnose::{REPORT, diagnose_into};
+use backdrive::failure::Failure;
+use backdrive_answers::asked::Asked;
+use backdrive_answers::found::Diagnosed;
+use backdrive_answers::opened::open;
 use backdrive_diagnosis::audit::{Remark, audit};
 use backdrive_diagnosis::belief::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
-use backdrive_sets::open;
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -41,15 +44,18 @@ pub struct Ask<'a> {
 /// When a file cannot be read or written, or the diagnosis fails.
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let (out, set) = placed(context, ask)?;
-    let opened = open::open(std::slice::from_ref(&set), None, None, &[]).map_err(backdrive::failure::Failure::from)?;
-    let settings = Settings {
+    let options = Options {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
-        effects: ask.effects,
-        effort: ask.effort * context.longer,
-        ..Settings::default()
+        effects: Some(ask.effects),
+        effort: Some(ask.effort * context.longer),
+        ..Options::default()
     };
-    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
-    Ok(found)
+    let opened = open(&Asked { set: vec![set], options, ..Asked::default() }).map_err(Failure::from)?;
+    let answer = diagnose_into(opened, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
+    match answer.found.device {
+        Diagnosed::OneAxis(found) => Ok(*found),
+        Diagnosed::Arm(_) | Diagnosed::Servo(_) => Err(StudyError::Diagnosis(format!("{}: is no device of one axis", ask.set))),
+    }
 }
 
 /// Puts the model and the set of a diagnosis into its folder of results: the folder, and the set there.

@@ -1,9 +1,10 @@
 //! What a master does that its model does not: a diagnosis of the recorded loop, with the force on the motor and the hand as what was put in.
 
 use backdrive_diagnosis::hypothesis::{Family, Place};
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::candidate::{Candidate, price};
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
-use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::search::search;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings as NodeSettings};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Jitter, Recording};
@@ -182,8 +183,8 @@ struct Explained {
 }
 
 fn explained(problem: &Problem, patience: Duration, stop: &AtomicBool) -> Option<Explained> {
-    let settings = Settings { effects: 1, effort: EFFORT, patience, ..Settings::default() };
-    let search = search(problem, &settings, settings.limit(Some(stop)), &|_| {}).ok()?;
+    let options = Options { effects: Some(1), effort: Some(EFFORT), patience: Some(patience), ..Options::default() };
+    let search = search(problem, &options, options.limit(Some(stop)), &|_| {}).ok()?;
     let level = |levels: &[f64]| levels.iter().map(|l| l * l).sum::<f64>().sqrt();
     let given = level(&search.levels_given).max(f64::MIN_POSITIVE);
     let correlation = search.nominal.correlation_time;

@@ -18,32 +18,13 @@ use crate::arms::verdict::{Parts, place, verdict};
 use crate::arms::written::{Reading, model_of};
 use crate::audit::Weight;
 use crate::hypothesis::Place;
+use crate::options::Options;
 use crate::verdict::{NextExperiment, Planned, PlannedPayload, Remark, Verdict};
 use backdrive_plant::model::Model;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-motion.csv";
-
-/// What may be asked.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Effects that are not considered, by name.
-    pub without: Vec<String>,
-    /// How many effects may be missing at once, at most.
-    pub effects: usize,
-    /// Corner of the regression's filter, Hz, where the motion shall not say it.
-    pub corner_hz: Option<f64>,
-    /// Set by an interrupt: the search ends with what was found until then, and the verdict states this.
-    pub stop: Arc<AtomicBool>,
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings { without: Vec::new(), effects: MOST, corner_hz: None, stop: Arc::default() }
-    }
-}
 
 /// An effect that was fitted in full in a round of the search.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,20 +58,30 @@ pub struct Found {
     pub drawn: Drawn,
 }
 
-/// Diagnoses an arm.
+/// Diagnoses an arm. Once `stop` is set, or the patience that was asked for ends, the search ends with what was found until then, and the verdict states
+/// this; `report` hears what is being done.
 ///
 /// # Errors
 /// Where a log is of no use, or the robot cannot be computed.
-pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmError> {
-    let mut data = Data::new(problem, settings.corner_hz, false)?;
+pub fn diagnose(
+    problem: &Problem,
+    options: &Options,
+    stop: Option<&AtomicBool>,
+    report: &(dyn Fn(&str) + Sync),
+) -> Result<Found, ArmError> {
+    let limit = options.limit_as_asked(stop);
+    let most = options.effects.unwrap_or(MOST);
+    report("looking at the logs of the arm");
+    let mut data = Data::new(problem, options.corner_hz, false)?;
     let mut remarks = audit(problem, &data);
     if let Some(bad) = remarks.iter().find(|r| r.weight == Weight::Unusable) {
         return Err(ArmError::Log { log: bad.place.clone(), message: bad.message.clone() });
     }
-    let mut found = search(&mut data, &settings.without, settings.effects, &settings.stop)?;
-    let cut_short = settings.stop.load(Ordering::Relaxed);
+    report("diagnosing the arm");
+    let mut found = search(&mut data, &without(options), most, limit)?;
+    let cut_short = limit.is_over();
     remarks.extend(load_remarks(&data, &found));
-    let mut whole = Data::new(problem, settings.corner_hz, true)?;
+    let mut whole = Data::new(problem, options.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
         *fit = consistent(&data, fit, &found.weights).ok_or_else(|| {
             ArmError::Robot("no physically feasible inertial parameters were found near those of the regression".to_string())
@@ -103,6 +94,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let (model, mut notes) = model_of(&data, &found.best)?;
     let (nominal, _) = model_of(&data, &found.refit)?;
     notes.extend(problem.notes.iter().cloned().chain(data.notes_along()));
+    report("simulating the arm in closed loop");
     let gains = gains(&data, &model).unwrap_or_default();
     let simulated = |model: &Model, fit: &Fit| judge(&data, model, &Reading::of(&data, fit), &gains);
     let loops = [simulated(&nominal, &found.refit), simulated(&model, &found.best)];
@@ -130,14 +122,16 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
         ));
     }
     if cut_short {
-        notes.push("the search was interrupted: other missing effects were not fully searched for".to_string());
+        let by = if limit.was_stopped() { "interrupted" } else { "cut off by the clock (--patience)" };
+        notes.push(format!("the search was {by}: other missing effects were not fully searched for"));
     }
-    if rare(&found.best.structure) >= settings.effects {
+    if rare(&found.best.structure) >= most {
         notes.push(format!(
             "the search ended at {} effects, the limit of --effects, besides those of every joint: more may be missing",
-            settings.effects
+            most
         ));
     }
+    report("planning the next motion");
     let plan = plan(&data, &found)?;
     let next = next(&plan, problem);
     let drawn = drawn(&data, &whole, &found, &plan.excitation);
@@ -145,6 +139,16 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let verdict =
         verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, judged, next: Some(next), cut_short })?;
     Ok(Found { verdict, model: model.to_toml(), experiment: plan.excitation.csv(problem), notes, tried, drawn })
+}
+
+/// Effects that are not to be considered, with those that contain them as a special case.
+fn without(options: &Options) -> Vec<String> {
+    let mut out = options.without.clone();
+    if options.without.iter().any(|name| name == "coulomb") {
+        // Both are dry friction of one level in a limit of their shape: no displacement, or far higher speeds than occur.
+        out.extend(["dahl", "stribeck"].map(str::to_string));
+    }
+    out
 }
 
 fn tried_of(data: &Data, tried: &crate::arms::search::Tried) -> Tried {

@@ -8,7 +8,7 @@ use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
 use crate::belief::predictive::{Gain, gain};
-use std::sync::atomic::{AtomicBool, Ordering};
+use crate::output_error::work::Limit;
 
 /// Effects that are added at most, without those that every joint has.
 pub const MOST: usize = 8;
@@ -75,16 +75,16 @@ pub struct Rival {
     pub structure: Structure,
 }
 
-/// Looks for what is missing. `without`: names of effects that are not considered; `most`: effects that are added at most; `stop`: set by an interrupt, which
-/// ends the search with what was found until then.
+/// Looks for what is missing. `without`: names of effects that are not considered; `most`: effects that are added at most; `limit`: what
+/// ends the search from outside, with what was found until then.
 ///
 /// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file. The residual of a missing law does not
 /// measure a mass, and the friction of a joint without a motor is known only in the size of its inertia.
 ///
 /// # Errors
 /// Where a fit cannot be computed at all.
-pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
-    let found = searched_again(data, without, most, stop)?;
+pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
+    let found = searched_again(data, without, most, limit)?;
     if !(0..data.problem.joints.len()).any(|j| data.is_passive(j)) || found.best.structure.tolerance == 0 {
         return Ok(found);
     }
@@ -96,18 +96,18 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
     }
     data.most_tolerance = 0;
     data.see(&data.problem.bodies.nominal)?;
-    searched_again(data, without, most, stop)
+    searched_again(data, without, most, limit)
 }
 
 /// Searches; where that ends with many rare effects, once more with friction and armature at every joint from the start. Rare effects take the place of common
 /// ones that are not there when they are tried. Of the two, that with fewer rare effects is kept, unless it surely predicts held-out segments worse.
-fn searched_again(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
-    let found = search_within(data, without, most, stop, Start::AsGiven)?;
-    if rare(&found.best.structure) < MANY_RARE || stop.load(Ordering::Relaxed) {
+fn searched_again(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
+    let found = search_within(data, without, most, limit, Start::AsGiven)?;
+    if rare(&found.best.structure) < MANY_RARE || limit.is_over() {
         return Ok(found);
     }
     data.see(&data.problem.bodies.nominal)?;
-    let again = search_within(data, without, most, stop, Start::WithFriction)?;
+    let again = search_within(data, without, most, limit, Start::WithFriction)?;
     let (mine, other) = (rare(&found.best.structure), rare(&again.best.structure));
     let is_surely_better = |a: &Fit, b: &Fit| compare(data, a, b, &found.weights).is_some_and(|g| g.is_sure());
     if is_surely_better(&found.best, &again.best) || other < mine && !is_surely_better(&again.best, &found.best) {
@@ -117,7 +117,7 @@ fn searched_again(data: &mut Data, without: &[String], most: usize, stop: &Atomi
     Ok(found)
 }
 
-fn search_within(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool, from: Start) -> Result<Search, ArmError> {
+fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit, from: Start) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
@@ -132,7 +132,7 @@ fn search_within(data: &mut Data, without: &[String], most: usize, stop: &Atomic
     for round in 0..2 {
         best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
         best = slipped(data, best, &weights);
-        grow(data, &pool, most, &mut best, &weights, &mut tried, stop);
+        grow(data, &pool, most, &mut best, &weights, &mut tried, limit);
         if round == 0 {
             let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
             data.see(&data.parameters(&bodies))?;
@@ -255,7 +255,7 @@ pub fn rare(structure: &Structure) -> usize {
 }
 
 /// Adds what is worth it.
-fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>, stop: &AtomicBool) {
+fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>, limit: Limit) {
     // Adding and exchanging can take turns: what was there once ends it.
     let mut seen: Vec<Vec<(Physics, crate::arms::physics::At)>> = Vec::new();
     while rare(&best.structure) < most {
@@ -275,7 +275,7 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
             terms.extend(hidden.filter(|t| !terms.contains(t)).collect::<Vec<_>>());
         }
         for term in terms {
-            if stop.load(Ordering::Relaxed) {
+            if limit.is_over() {
                 return;
             }
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };

@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::belief::choice::chosen;
     use crate::equation_error::search_on_forces;
-    use crate::search::Settings;
+    use crate::options::Options;
     use backdrive_plant::recording::Recording;
     use backdrive_plant::write::{Edit, Value};
 
@@ -142,8 +142,8 @@ mod tests {
         let held_out = vec![record(&model, "h.csv", 2.0)];
         let problem = Problem::new(DRIVEN.to_string(), "lever.toml".into(), model.clone(), records, held_out, Initial::Free).unwrap();
         let turned = inverse(&problem).unwrap();
-        let settings = Settings::default();
-        let (_, search) = search_on_forces(&turned, &settings, settings.limit(None), &|_| ()).unwrap();
+        let options = Options::default();
+        let (_, search) = search_on_forces(&turned, &options, options.limit(None), &|_| ()).unwrap();
         let best = chosen(&search);
         let mut names: Vec<&str> = best.structure.added.iter().map(|h| h.physics.name).collect();
         names.sort_unstable();

@@ -26,7 +26,7 @@ pub fn figures_of(problem: &Problem) -> Vec<(String, [Figures; 2])> {
         true => corners(problem).into_iter().filter_map(|corner| room::Room::of(problem, corner, &[])).collect(),
         false => Vec::new(),
     };
-    let Some(explored) = explore::explore(&rooms, crate::search::Settings::default().effects) else { return Vec::new() };
+    let Some(explored) = explore::explore(&rooms, crate::options::EFFECTS) else { return Vec::new() };
     let one = |law: &usize| (rooms[0].named(*law).physics.name.to_string(), figures(&rooms, &explored, *law));
     explored.best().laws.iter().map(one).collect()
 }

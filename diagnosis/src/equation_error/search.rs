@@ -7,18 +7,19 @@ use crate::belief::compare::unseen;
 use crate::belief::on_forces::{Belief, Same, belief, nearest};
 use crate::belief::statistics::levels;
 use crate::hypothesis::Hypothesis;
+use crate::options::Options;
 use crate::output_error::candidate::{Candidate, candidate, key_of, sort};
 use crate::output_error::evaluator::Evaluator;
 use crate::output_error::structure::{FreeParameter, Role, Structure};
 use crate::output_error::work::{Budget, Limit};
 use crate::recordings::problem::{Problem, Record};
-use crate::search::{Search, Settings, Tried};
+use crate::search::{Search, Tried};
 use crate::tuning::tuning;
 
 /// Searches on forces; `None` where force and motion are not both known. The problem that comes back is the one in the band of the fits.
 pub(crate) fn search_on_forces(
     problem: &Problem,
-    settings: &Settings,
+    options: &Options,
     limit: Limit,
     report: &(dyn Fn(&str) + Sync),
 ) -> Option<(Problem, Search)> {
@@ -26,17 +27,17 @@ pub(crate) fn search_on_forces(
         return None;
     }
     report("looking at every law on the forces along the motion");
-    let rooms: Vec<Room> = super::corners(problem).into_iter().filter_map(|corner| Room::of(problem, corner, &settings.without)).collect();
+    let rooms: Vec<Room> = super::corners(problem).into_iter().filter_map(|corner| Room::of(problem, corner, &options.without)).collect();
     let laws = |room: &Room| (0..room.laws.len()).map(|law| room.named(law).id.clone()).collect::<Vec<_>>();
     if rooms.windows(2).any(|pair| laws(&pair[0]) != laws(&pair[1])) {
         return None;
     }
-    let mut explored = explore(&rooms, settings.effects)?;
+    let mut explored = explore(&rooms, options.effects_of_one_axis())?;
     report("simulating those that predict left-out stretches best");
     let band = clearest(&rooms, &explored)?;
     let room = rooms.get(band)?;
     let (sensor, problem) = (sensor_noise(problem, room.corner), room.problem.clone());
-    let budget = Budget::new(settings.work(), limit);
+    let budget = Budget::new(options.work(), limit);
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let noise = mean(room.left_out(explored.best().chosen.get(band)?)?).sqrt();
     let is_beyond = is_beyond_these_laws(&problem, noise);

@@ -22,6 +22,18 @@ pub struct Limit<'a> {
     pub deadline: Option<Instant>,
 }
 
+impl Limit<'_> {
+    /// Whether something from outside ends the work now. Once it does, it does for good.
+    pub fn is_over(&self) -> bool {
+        self.was_stopped() || self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+
+    /// Whether somebody interrupts it, and not the clock.
+    pub fn was_stopped(&self) -> bool {
+        self.stop.is_some_and(|s| s.load(Ordering::Relaxed))
+    }
+}
+
 /// Counts work, and determines when it has to end.
 #[derive(Debug, Clone)]
 pub struct Budget<'a> {
@@ -97,7 +109,7 @@ impl<'a> Budget<'a> {
 
     /// Whether something from outside ends it; may be asked anywhere.
     pub fn is_halted(&self) -> bool {
-        let halted = self.limit.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.limit.deadline.is_some_and(|d| Instant::now() >= d);
+        let halted = self.limit.is_over();
         if halted {
             self.cut.store(true, Ordering::Relaxed);
         }

@@ -10,13 +10,13 @@ pub mod race;
 mod result;
 mod schedule;
 pub mod screen;
-mod settings;
 mod share;
 mod state;
 mod steps;
 mod view;
 
 use crate::hypothesis::{Hypothesis, Place};
+use crate::options::Options;
 use crate::output_error::candidate::{key_of, sort};
 use crate::output_error::effort::Effort;
 use crate::output_error::error_budget::error_budget;
@@ -32,7 +32,6 @@ pub use journal::{Entry, Outcome};
 use nominal::Nominal;
 pub use result::{Detectable, Search, SearchError, Tried};
 pub use schedule::{StepRow, table as step_table};
-pub use settings::Settings;
 use share::Work;
 use state::State;
 use std::collections::HashSet;
@@ -42,12 +41,12 @@ use view::View;
 ///
 /// # Errors
 /// When the nominal model cannot be simulated on the recordings.
-pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Search, SearchError> {
-    let work = Work { budget: Budget::new(settings.work(), limit) };
+pub fn search(problem: &Problem, options: &Options, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Search, SearchError> {
+    let work = Work { budget: Budget::new(options.work(), limit) };
     let nominal = Nominal::refitted(problem, &work, report)?;
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let samples = refitted.fit.residuals.len();
-    let mut hypotheses = hypotheses_for(&nominal, settings);
+    let mut hypotheses = hypotheses_for(&nominal, options);
     report("searching for ripples");
     let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.noise_sd, &mut hypotheses);
     report("screening");
@@ -75,7 +74,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     };
     let mut tried = promised(&views, &hypotheses);
     let mut state = State::new(course, &views, &tried, &ripples, nominal.far, &work);
-    schedule::run(&mut state, settings, report);
+    schedule::run(&mut state, options, report);
     let (exhausted, journal) = (state.left_out, std::mem::take(&mut state.journal));
     let mut found = state.found;
     report("fitting the best to convergence");
@@ -117,9 +116,9 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
 }
 
 /// What may be missing: everything that is no stated parameter, each class once.
-fn hypotheses_for(nominal: &Nominal, settings: &Settings) -> Vec<Hypothesis> {
+fn hypotheses_for(nominal: &Nominal, options: &Options) -> Vec<Hypothesis> {
     let problem = nominal.evaluator.problem;
-    let withheld: Vec<&str> = settings.without.iter().map(String::as_str).collect();
+    let withheld: Vec<&str> = options.without.iter().map(String::as_str).collect();
     let mut hypotheses = physics::without(physics::all(&nominal.model, &nominal.scales), &withheld);
     let mut classes = HashSet::new();
     hypotheses.retain(|h| {

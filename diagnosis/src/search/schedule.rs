@@ -1,12 +1,12 @@
 //! In which order steps are taken, and how much work each may do: the only place that decides either.
 
 use super::journal::Outcome;
-use super::settings::Settings;
 use super::state::State;
 use super::steps::{
     BesideTheBest, Exchanges, Finer, FromNominal, Laws, More, MorePairs, OneParameter, OtherPlaces, Pairs, Race, Relatives,
     RestoredDefaults, Richer, Ripples, Scans, Singles, Split, Step,
 };
+use crate::options::Options;
 use crate::output_error::candidate::key_of;
 use crate::search::race::{Course, distinct};
 use crate::tuning::tuning;
@@ -76,8 +76,8 @@ pub fn table() -> Vec<StepRow> {
 }
 
 /// Takes all steps, as far as there is work to be done and something left to explain.
-pub(super) fn run(state: &mut State, settings: &Settings, report: &(dyn Fn(&str) + Sync)) {
-    for step in steps(state.is_quiet(), settings.effects) {
+pub(super) fn run(state: &mut State, options: &Options, report: &(dyn Fn(&str) + Sync)) {
+    for step in steps(state.is_quiet(), options.effects_of_one_axis()) {
         let outcome = match hindrance(step, state) {
             Some(hindrance) => hindrance,
             None => {

@@ -2,9 +2,10 @@
 
 use crate::common::{AS_STATED, set};
 use backdrive_diagnosis::arms::audit::audit;
-use backdrive_diagnosis::arms::diagnose::{Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::diagnose;
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::arms::regression::Data;
+use backdrive_diagnosis::options::Options;
 use backdrive_plant::set::RecordingSet;
 
 type Columns = [Vec<f64>; 7];
@@ -25,7 +26,7 @@ fn refused(joints: &str, change: impl Fn(&mut Columns)) -> String {
         Err(error) => return error.to_string(),
     };
     match Problem::open(&set, None) {
-        Ok(problem) => diagnose(&problem, &Settings::default()).unwrap_err().to_string(),
+        Ok(problem) => diagnose(&problem, &Options::default(), None, &|_| ()).unwrap_err().to_string(),
         Err(error) => error.to_string(),
     }
 }

@@ -1,7 +1,7 @@
 //! Arms whose torque is known: what is in their logs is found, at its joint, with its size; nothing is found where nothing is.
 
 use crate::common::{AS_STATED, Beside, set};
-use backdrive_diagnosis::arms::diagnose::{Found, Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::judge::{AGAINST, each, gains, judge};
 use backdrive_diagnosis::arms::physics::Physics;
 use backdrive_diagnosis::arms::problem::Problem;
@@ -9,16 +9,19 @@ use backdrive_diagnosis::arms::regression::Data;
 use backdrive_diagnosis::arms::search::{Search, added, search};
 use backdrive_diagnosis::arms::written::{Reading, model_of};
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options::Options;
+use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::verdict::{Finding, Parameter, Word};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::RecordingSet;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 fn found(beside: &Beside) -> Found {
     let folder = tempfile::tempdir().unwrap();
     set(folder.path(), beside, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
-    diagnose(&problem, &Settings::default()).unwrap()
+    diagnose(&problem, &Options::default(), None, &|_| ()).unwrap()
 }
 
 fn number(finding: &Finding, key: &str) -> (f64, f64, f64) {
@@ -93,7 +96,7 @@ fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
     set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
     let mut data = Data::new(&problem, None, false).unwrap();
-    let mut found = search(&mut data, &[], 8, &AtomicBool::new(false)).unwrap();
+    let mut found = search(&mut data, &[], 8, Limit::default()).unwrap();
     let ratio = |found: &Search| {
         let (model, _) = model_of(&data, &found.best).unwrap();
         let gains = gains(&data, &model).unwrap();
@@ -117,7 +120,7 @@ fn the_loop_of_the_judge_is_no_stiffer_than_a_rotor_alone_bears() {
     set(folder.path(), &Beside { soft: [0.0, 1.0 / 12.0], ..AS_STATED }, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
     let mut data = Data::new(&problem, None, false).unwrap();
-    let found = search(&mut data, &[], 8, &AtomicBool::new(false)).unwrap();
+    let found = search(&mut data, &[], 8, Limit::default()).unwrap();
     let (mut model, _) = model_of(&data, &found.best).unwrap();
     let rotor = model.bodies.iter().position(|body| body.name == "elbow.rotor").expect("a motor before the soft gear");
     let mut of = |inertia: f64| {
@@ -137,9 +140,11 @@ fn an_interrupted_search_says_so_and_gives_no_green_answer() {
     let folder = tempfile::tempdir().unwrap();
     set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
-    let settings = Settings::default();
-    settings.stop.store(true, std::sync::atomic::Ordering::Relaxed);
-    let found = diagnose(&problem, &settings).unwrap();
-    assert_eq!(found.verdict.word, Word::CannotTell);
-    assert!(found.verdict.searched.as_ref().is_some_and(|s| s.cut_short) && found.notes.iter().any(|n| n.contains("interrupted")));
+    let stop = AtomicBool::new(true);
+    let impatient = Options { patience: Some(Duration::ZERO), ..Options::default() };
+    for (options, stop, why) in [(Options::default(), Some(&stop), "interrupted"), (impatient, None, "--patience")] {
+        let found = diagnose(&problem, &options, stop, &|_| ()).unwrap();
+        assert_eq!(found.verdict.word, Word::CannotTell);
+        assert!(found.verdict.searched.as_ref().is_some_and(|s| s.cut_short) && found.notes.iter().any(|n| n.contains(why)));
+    }
 }

@@ -3,9 +3,10 @@
 #[path = "../../../tests/common/skipped.rs"]
 mod skipped;
 
-use backdrive_diagnosis::arms::diagnose::{Found, Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::verdict::{Estimate, Finding, Parameter};
 use backdrive_plant::set::RecordingSet;
 use std::path::Path;
@@ -18,7 +19,7 @@ fn diagnosed(case: &str, set: &str) -> Option<Found> {
         return None;
     }
     let problem = Problem::open(&RecordingSet::open(&path).unwrap(), None).unwrap();
-    Some(diagnose(&problem, &Settings::default()).unwrap())
+    Some(diagnose(&problem, &Options::default(), None, &|_| ()).unwrap())
 }
 
 fn finding<'f>(found: &'f Found, physics: &str, joint: &str) -> &'f Finding {

@@ -1,15 +1,16 @@
 //! The planned motion determines what the logs leave open, and a stated payload counts.
 
 use crate::common::{AS_STATED, Beside, TIP, along, series, set, write};
-use backdrive_diagnosis::arms::diagnose::{Found, Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Planned, Word};
 use backdrive_plant::set::RecordingSet;
 use std::path::Path;
 
 fn found(folder: &Path) -> Found {
-    diagnose(&Problem::open(&RecordingSet::open(folder).unwrap(), None).unwrap(), &Settings::default()).unwrap()
+    diagnose(&Problem::open(&RecordingSet::open(folder).unwrap(), None).unwrap(), &Options::default(), None, &|_| ()).unwrap()
 }
 
 fn planned(found: &Found) -> &Planned {
@@ -111,7 +112,8 @@ fn a_payload_that_is_said_tells_torque_constants_from_masses() {
     assert!((e.value - 1.15).abs() < 0.02, "{gain:?}");
     // If the payload is not stated, masses and torque constants have one common factor, and no file's parameters are right.
     std::fs::write(folder.path().join("set.toml"), "model = \"arm.toml\"\nfit = [\"d.csv\", \"e.csv\"]\nheld_out = [\"f.csv\"]\n").unwrap();
-    let silent = diagnose(&Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap(), &Settings::default()).unwrap();
+    let silent =
+        diagnose(&Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap(), &Options::default(), None, &|_| ()).unwrap();
     assert_ne!(silent.verdict.word, Word::NothingMissing);
 }
 

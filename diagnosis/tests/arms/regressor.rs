@@ -22,7 +22,7 @@ fn motion() -> Motion {
         velocity: vec![wave(0.23), wave(0.41)],
         acceleration: vec![wave(0.53), wave(0.37)],
         torque: Vec::new(),
-        told: Vec::new(),
+        recorded_velocity: Vec::new(),
         moves: Vec::new(),
         counts: Vec::new(),
         payload: None,

@@ -1,11 +1,12 @@
 //! Elements of the nominal model count, whatever their law; torque that is clipped or without its sign is no ground for a claim; a joint may have no motor.
 
 use crate::common::{AS_STATED, Beside, URDF, series, set, write};
-use backdrive_diagnosis::arms::diagnose::{Found, Settings, diagnose};
+use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::arms::regression::{Data, parts_of};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Word};
 use backdrive_plant::robot::{RobotFile, Tree};
 use backdrive_plant::set::RecordingSet;
@@ -26,7 +27,7 @@ fn at_elbow(kind: &str, parameters: &str) -> String {
 }
 
 fn found(folder: &Path) -> Found {
-    diagnose(&problem(folder), &Settings::default()).unwrap()
+    diagnose(&problem(folder), &Options::default(), None, &|_| ()).unwrap()
 }
 
 /// Findings as effect and place.
@@ -298,7 +299,7 @@ fn a_joint_without_a_motor_is_diagnosed_by_its_equation() {
     for (seed, name) in ["a.csv", "b.csv", "c.csv"].iter().enumerate() {
         write(&place.join(name), &swing(seed as u64 + 5, 0.01));
     }
-    let refused = diagnose(&problem(place), &Settings::default()).unwrap_err().to_string();
+    let refused = diagnose(&problem(place), &Options::default(), None, &|_| ()).unwrap_err().to_string();
     assert!(refused.contains("elbow.torque: is 0 in all samples") && refused.contains("set torque = 0 in [joints.elbow]"), "{refused}");
 
     let joints = "[joints.shoulder]\nposition = \"q1\"\ntorque = \"tau1\"\n[joints.elbow]\nposition = \"q2\"\ntorque = 0\n";

@@ -1,8 +1,8 @@
-//! The report of `backdrive diagnose` on an arm: pictures first, the numbers beside them.
+//! The report on an arm.
 
+use super::about::About;
 use super::phrases::tone;
 use super::{arm_figures as figures, arm_tables as tables};
-use crate::offered::Step;
 use crate::parts::{ending, sentence, todo};
 use backdrive_diagnosis::arms::diagnose::Found;
 use backdrive_diagnosis::arms::problem::Problem;
@@ -10,23 +10,9 @@ use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_report::{Page, percent};
 
-/// What a report shows.
-pub struct Shown<'a> {
-    /// The model and its logs.
-    pub problem: &'a Problem,
-    /// What was found.
-    pub found: &'a Found,
-    /// The set, for the title.
-    pub name: &'a str,
-    /// What a reader should know first.
-    pub notes: &'a [String],
-    /// What to do next.
-    pub steps: &'a [Step],
-}
-
 /// The report.
-pub fn page(shown: &Shown) -> Page {
-    let Shown { problem, found, name, notes, steps } = shown;
+pub(super) fn page(problem: &Problem, found: &Found, about: &About) -> Page {
+    let About { name, notes, steps } = about;
     let verdict = &found.verdict;
     let held = !problem.held_out.is_empty();
     let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));

@@ -1,7 +1,7 @@
 //! Tables of an arm: findings, joints, inertial parameters, what was tried, logs.
 
-use super::sentences::{confidence, parameters};
 use crate::parts::{file_name, sentence};
+use backdrive_answers::sentences::{confidence, parameters};
 use backdrive_diagnosis::arms::diagnose::Tried;
 use backdrive_diagnosis::arms::judge::AGAINST;
 use backdrive_diagnosis::arms::problem::Problem;

@@ -1,9 +1,9 @@
-//! The report of `backdrive diagnose` on joints that position servos drive.
+//! The report on joints that position servos drive.
 
+use super::about::About;
 use super::phrases::tone;
-use crate::estimate::estimate;
-use crate::offered::Step;
 use crate::parts::{ending, file_name, sentence, todo};
+use backdrive_answers::estimate::estimate;
 use backdrive_diagnosis::verdict::Parameter;
 use backdrive_diagnosis::verdict::words as said;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number};
@@ -26,15 +26,16 @@ const TERMS: [(&str, &str); 5] = [
     ("force in rad", "over the servo's proportional gain: the angle between command and position that balances it"),
 ];
 
-/// The report: `name` is the set, for the title, and `steps` what to do next.
-pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Page {
+/// The report.
+pub(super) fn page(problem: &Problem, found: &Found, about: &About) -> Page {
+    let About { name, notes, steps } = about;
     let verdict = &found.verdict;
     let mut page = Page::new(&format!("Diagnosis of the servo joints of {name}"));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     let Some(servo) = &verdict.servo else { return page };
     todo(&mut page, steps);
     page.text(&sentence(&servo.scale));
-    for note in &found.notes {
+    for note in *notes {
         page.note(&sentence(note));
     }
     for remark in &verdict.audit {

@@ -1,12 +1,12 @@
-//! What `backdrive diagnose` prints: a dozen lines for a person, from the same data as the verdict file.
+//! What a diagnosis of one axis prints: a dozen lines for a person, from the same data as the verdict file.
 
+use crate::sentences::{alternatives, confidence, errors, next_experiment, parameters, shows};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::belief::parameters::rows;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::words;
 use backdrive_diagnosis::verdict::{Finding, HeldOut, Remaining};
-use backdrive_pages::diagnose::sentences::{alternatives, confidence, errors, next_experiment, parameters, shows};
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 const REMARKS: usize = 3;
 
 /// The dozen lines.
-pub fn text(found: &Diagnosis) -> String {
+pub(crate) fn text(found: &Diagnosis) -> String {
     let mut out = String::new();
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "{name:<9} {text}");

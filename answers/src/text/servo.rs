@@ -1,93 +1,16 @@
-//! `backdrive diagnose` of joints that position servos drive: logs of commands and positions, without torque.
+//! What a diagnosis of servo joints prints.
 
-use crate::cli;
-use crate::failure::{Failure, code};
-use crate::offered::{Builder, Step};
-use crate::output;
-use crate::progress;
+use crate::estimate::estimate;
 use backdrive_diagnosis::verdict::words as said;
-use backdrive_diagnosis::verdict::{Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
-use backdrive_pages::diagnose::servo::page;
-use backdrive_pages::estimate::estimate;
-use backdrive_plant::set::RecordingSet;
+use backdrive_diagnosis::verdict::{Finding, Parameter};
 use backdrive_report::number;
-use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
-use backdrive_servo::problem::{Problem, is_servo};
+use backdrive_servo::diagnose::Found;
+use backdrive_servo::problem::Problem;
 use backdrive_servo::sentences::words;
-use backdrive_sets::{checks, open};
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-
-/// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is reported there.
-pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, Option<PathBuf>)>, Failure> {
-    let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
-    if !is_servo(&set) {
-        return Ok(None);
-    }
-    let model = options.model.clone().or_else(|| set.model.clone());
-    let mut notes = checks::repeated(&set)?;
-    open::hold_out(&mut set, told, &mut notes);
-    notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
-    Ok(Some((set, model)))
-}
-
-/// Diagnoses servo joints, writes, and prints what was found. `report`: where the page goes, where one is wanted.
-pub fn diagnose(
-    options: &cli::Diagnose,
-    set: &RecordingSet,
-    model: Option<&Path>,
-    report: Option<&Path>,
-    began: Instant,
-) -> Result<Word, Failure> {
-    if let Some(grip) = options.grip.as_deref().filter(|g| *g != Path::new("none")) {
-        return Err(Failure {
-            code: code::USAGE,
-            message: format!("--grip {}: a hand on a servo joint is not modelled; omit the option", grip.display()),
-        });
-    }
-    let files: Vec<PathBuf> =
-        model.map(Path::to_path_buf).into_iter().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-    open::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
-    // What cannot be written is reported before the work, not after it.
-    output::folder(&options.out)?;
-    report.map_or(Ok(()), output::writable)?;
-    let problem = Problem::open(set, model).map_err(Failure::input)?;
-    let found = progress::busy("diagnosing the servo joints", || diagnosed(&problem, &options.without)).map_err(Failure::input)?;
-    let write = |name: &str, text: &str| output::file(&options.out.join(name), text);
-    let json = serde_json::to_string_pretty(&found.verdict).map_err(Failure::input)?;
-    write(VERDICT_FILE, &format!("{json}\n"))?;
-    write(MODEL_FILE, &found.model.to_toml())?;
-    let mut written = [VERDICT_FILE, MODEL_FILE].map(str::to_string).to_vec();
-    if let Some(report) = report {
-        let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        output::page(report, page(&problem, &found, &name, &to_do(found.verdict.word, &options.out)))?;
-        written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
-    }
-    let seconds = began.elapsed().as_secs_f64();
-    write("time.txt", &format!("{seconds:.2}\n"))?;
-    if options.json {
-        output::json(&found.verdict)?;
-    } else {
-        output::line(text(&problem, &found))?;
-        if options.explain {
-            output::line(format_args!("\n{}\n", explained(&problem, &found)))?;
-        }
-        output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
-    }
-    Ok(found.verdict.word)
-}
-
-/// What to do next, where the model may be used.
-fn to_do(word: Word, out: &Path) -> Vec<Step> {
-    let model = out.join(MODEL_FILE);
-    let usable = matches!(word, Word::Missing | Word::Parameters | Word::NothingMissing);
-    let show = || Builder::verb("model show").reads(&model).build();
-    usable.then(|| Step::new(format!("Use {}; this shows its parameters:", model.display()), [show()])).into_iter().collect()
-}
 
 /// What was found, for a terminal.
-fn text(problem: &Problem, found: &Found) -> String {
+pub(crate) fn text(problem: &Problem, found: &Found) -> String {
     let mut out = String::new();
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "{name:<9} {text}");
@@ -170,7 +93,7 @@ fn looked_at(adds: &[&str], drops: Option<&str>) -> String {
 }
 
 /// What the search looked at, joint by joint.
-fn explained(problem: &Problem, found: &Found) -> String {
+pub(crate) fn explained(problem: &Problem, found: &Found) -> String {
     let mut out = format!("{:<20} {:<58} {:>10} {:>12}  accepted", "joint", "effect", "lowers", "held out, sd");
     for answer in &found.answers {
         for tried in &answer.found.tried {

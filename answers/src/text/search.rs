@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 const SHOWN: usize = 25;
 
 /// Both tables.
-pub fn explained(search: &Search) -> String {
+pub(crate) fn explained(search: &Search) -> String {
     format!("{}\n{}", steps(search), structures(search))
 }
 

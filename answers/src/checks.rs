@@ -1,0 +1,145 @@
+//! What is asked, checked: values of options, and options and keys of a set that mean something else for one device than for another, or nothing. None is
+//! passed over in silence.
+
+use crate::asked::Asked;
+use crate::error::AnswerError;
+use backdrive_diagnosis::arms::physics::ALL as OF_ARMS;
+use backdrive_diagnosis::physics::{PHYSICS, physics_named};
+use backdrive_plant::set::{Initial, RecordingSet};
+use backdrive_servo::physics::ALL as OF_SERVOS;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// The name of an effect that some device may have.
+///
+/// # Errors
+/// There is no such effect: a sentence with those that there are.
+pub fn effect(name: &str) -> Result<String, String> {
+    if let Some(known) = physics_named(name) {
+        return Ok(known.name.to_string());
+    }
+    let of_arms = || OF_ARMS.iter().map(|p| p.facts().name);
+    let of_servos = || OF_SERVOS.iter().map(|p| p.name);
+    if of_arms().chain(of_servos()).any(|known| known == name) {
+        return Ok(name.to_string());
+    }
+    let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
+    let more = |names: Vec<&'static str>| names.into_iter().filter(|n| !known.contains(n)).collect::<Vec<_>>().join(", ");
+    let (arms, servos) = (more(of_arms().collect()), more(of_servos().collect()));
+    Err(format!("no such physics; there are {}; of arms also {arms}; of position servos also {servos}", known.join(", ")))
+}
+
+/// Refuses options with values that they cannot have for any device.
+///
+/// # Errors
+/// An effect is unknown, or a number is beyond its bounds.
+pub(crate) fn refuse_wrong(asked: &Asked) -> Result<(), AnswerError> {
+    let usage = |message: String| Err(AnswerError::Usage(message));
+    let options = &asked.options;
+    if let Some((name, why)) = options.without.iter().find_map(|name| Some((name, effect(name).err()?))) {
+        return usage(format!("without {name}: {why}"));
+    }
+    match (options.effects, options.effort) {
+        (Some(effects), _) if !EFFECTS.contains(&effects) => {
+            usage(format!("effects is {effects}, and must be {} to {}", EFFECTS.start(), EFFECTS.end()))
+        }
+        (_, Some(effort)) if !(effort.is_finite() && effort > 0.0) => usage(format!("effort is {effort}, and must be above 0")),
+        _ => Ok(()),
+    }
+}
+
+/// How many effects may be missing at once.
+const EFFECTS: RangeInclusive<usize> = 1..=8;
+
+/// Refuses effects to leave out that a device of one axis cannot have.
+///
+/// # Errors
+/// When one is an effect of arms or of servo joints only.
+pub(crate) fn refuse_of_one_axis(asked: &Asked) -> Result<(), AnswerError> {
+    match asked.options.without.iter().find(|name| physics_named(name).is_none()) {
+        Some(name) => Err(AnswerError::Usage(format!("--without {name}: it is only for arms, and this model has no [robot]; omit it"))),
+        None => Ok(()),
+    }
+}
+
+/// What a reader should know of the options that have no effect for an arm.
+///
+/// # Errors
+/// When an option or a key of the set would change what the logs are of, which a diagnosis of an arm cannot take into account.
+pub(crate) fn of_arm(asked: &Asked, set: &RecordingSet) -> Result<Vec<String>, AnswerError> {
+    if let Some(grip) = gripped(asked) {
+        return Err(AnswerError::Usage(format!(
+            "--grip {}: a hand on an arm is not modelled by its diagnosis; omit the option, and record the arm without a hand",
+            grip.display()
+        )));
+    }
+    let file = set.folder.join("set.toml");
+    if let Some((input, _)) = set.unknown.first() {
+        return Err(AnswerError::Input(format!(
+            "{}, unknown.{input}: an arm is diagnosed from the torque of every joint, and none may be unknown; leave the key out",
+            file.display()
+        )));
+    }
+    let conditions = set.files.iter().find_map(|(name, rules)| Some((name, &rules.condition.first()?.0)));
+    if let Some((name, path)) = conditions {
+        return Err(AnswerError::Input(format!(
+            "{}, files.\"{name}\".condition.{path}: logs of an arm are all fitted with the same numbers; diagnose those with another {path} in a set \
+             of their own",
+            file.display()
+        )));
+    }
+    let mut out = Vec::new();
+    if asked.options.effort.is_some() {
+        out.push("--effort does nothing for an arm: every physics is tried at every joint, and the search ends by itself".to_string());
+    }
+    for name in &asked.ignore_signal {
+        out.push(format!("--ignore-signal {name} does nothing for an arm: of its logs only the columns of its joints are read"));
+    }
+    let of_arms: Vec<&str> = OF_ARMS.iter().map(|p| p.facts().name).collect();
+    for name in asked.options.without.iter().filter(|name| !of_arms.contains(&name.as_str())) {
+        out.push(format!("--without {name} does nothing for an arm, whose search has {}", of_arms.join(", ")));
+    }
+    for name in &set.ignore {
+        out.push(format!(
+            "{}, ignore: \"{name}\" does nothing for an arm: of its logs only the columns of its joints are read",
+            file.display()
+        ));
+    }
+    if set.initial == Initial::Free {
+        out.push(format!("{}, initial: does nothing for an arm, which may start in any state", file.display()));
+    }
+    if set.mixed_rates {
+        out.push(format!("{}, mixed_rates: does nothing for an arm: all its logs are laid on the grid of the slowest", file.display()));
+    }
+    Ok(out)
+}
+
+/// What a reader should know of the options that have no effect for servo joints.
+///
+/// # Errors
+/// When a grip is asked for: a hand on a servo joint is not modelled.
+pub(crate) fn of_servo(asked: &Asked) -> Result<Vec<String>, AnswerError> {
+    if let Some(grip) = gripped(asked) {
+        let message = format!("--grip {}: a hand on a servo joint is not modelled; omit the option", grip.display());
+        return Err(AnswerError::Usage(message));
+    }
+    let mut out = Vec::new();
+    if asked.options.effort.is_some() {
+        out.push(
+            "--effort does nothing for servo joints: every physics is tried at every joint, and the search ends by itself".to_string(),
+        );
+    }
+    for name in &asked.ignore_signal {
+        out.push(format!("--ignore-signal {name} does nothing for servo joints: only commands and positions are read"));
+    }
+    let of_servos: Vec<&str> = OF_SERVOS.iter().map(|p| p.name).collect();
+    for name in asked.options.without.iter().filter(|name| !of_servos.contains(&name.as_str())) {
+        out.push(format!("--without {name} does nothing for servo joints, whose search has {}", of_servos.join(", ")));
+    }
+    Ok(out)
+}
+
+/// The grip, where one is asked for.
+fn gripped(asked: &Asked) -> Option<&Path> {
+    asked.grip.as_deref().filter(|grip| *grip != Path::new("none"))
+}
