@@ -204,7 +204,7 @@ pub fn simulate_typed(
     })
 }
 
-/// Parts of a loop that are swapped, by their names on the command line; `None` leaves a part as it was recorded.
+/// Parts of a loop that are swapped, by their names on the command line; `None` keeps the recorded part.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Parts {
