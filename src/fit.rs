@@ -67,7 +67,7 @@ pub enum Refit {
     /// A network of one axis: what was fitted, and the result.
     OneAxis(Box<(Fit, Fitted)>),
     /// Joints that position servos drive.
-    Servo(ServoRefit),
+    Servo(Box<ServoRefit>),
 }
 
 impl Refit {
@@ -78,7 +78,7 @@ impl Refit {
     pub fn of(asked: &Options, out: Option<&Path>, overwrite: bool, stop: &AtomicBool) -> Result<Refit, Failure> {
         let model = Model::load(&asked.model)?;
         if !model.servos.is_empty() {
-            return ServoRefit::of(asked, out, overwrite).map(Refit::Servo);
+            return ServoRefit::of(asked, out, overwrite).map(|joints| Refit::Servo(Box::new(joints)));
         }
         if model.arm.is_some() {
             let model = asked.model.display();

@@ -9,7 +9,7 @@ pub mod call;
 pub mod caller;
 mod cli;
 mod columns;
-mod compare;
+pub mod compare;
 pub mod diagnose;
 mod doctor;
 mod export;

@@ -66,6 +66,19 @@ def stability(
     parts: dict[str, Any],
     progress: Progress,
 ) -> Answer: ...
+def compare(
+    session: str,
+    *,
+    laws: list[str],
+    delays_ms: list[float] | None,
+    jitter_ms: list[tuple[float, float]] | None,
+    loss: list[float] | None,
+    grips: list[float] | None,
+    at_ms: float | None,
+    lambda_: float | None,
+    parts: dict[str, Any],
+    progress: Progress,
+) -> Answer: ...
 def why(recording: str, *, roles: Any, progress: Progress) -> Answer: ...
 def inspect(files: list[str], *, rate: float | None, columns: list[str] | None, time: str | None, progress: Progress) -> Answer: ...
 def run(arguments: list[str], progress: Progress = None) -> tuple[int, str, list[str], str | None]: ...

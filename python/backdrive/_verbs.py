@@ -14,7 +14,7 @@ from ._work import INTERRUPTED, Progress, Work
 
 Path = str | os.PathLike[str]
 
-# Parts of a loop that `stability` swaps.
+# Parts of a loop that `stability` and `compare` swap.
 _PARTS = ("master", "grip", "slave", "environment", "canceller", "canceller_grip", "high_pass", "hand", "edge_without", "sensors", "limits", "script")
 
 
@@ -52,6 +52,19 @@ def _text(value: Any) -> str:
 
 def _some(value: str | Sequence[str]) -> list[str]:
     return [value] if isinstance(value, str) else list(value)
+
+
+def _list(values: Sequence[Any] | None) -> list[Any] | None:
+    return None if values is None else list(values)
+
+
+def _parts(given: Mapping[str, Any], without: str = "") -> dict[str, Any]:
+    """Parts of a loop that are swapped, those that are not as `None`."""
+    names = [name for name in _PARTS if name != without]
+    unknown = ", ".join(given.keys() - set(names))
+    if unknown:
+        raise UsageError(f"{unknown}: is no part of a loop; there are {', '.join(names)}", 2)
+    return {name: given.get(name) for name in _PARTS}
 
 
 def _grip(work: Work, grip: Any) -> str | None:
@@ -209,9 +222,6 @@ def stability(
     roles: which topic or column is which signal: a file, or the same as dictionaries (docs/roles-example.toml).
     parts: other parts of the loop, as on the command line: `master="model.toml"`, `canceller="none"`.
     """
-    unknown = ", ".join(parts.keys() - set(_PARTS))
-    if unknown:
-        raise UsageError(f"{unknown}: is no part of a loop; there are {', '.join(_PARTS)}", 2)
     with Work(progress) as work:
         answer = work.answer(
             _backdrive.stability,
@@ -221,9 +231,45 @@ def stability(
             mu=mu,
             lambda_=lambda_,
             sweep=sweep,
-            grips=None if grips is None else list(grips),
+            grips=_list(grips),
             coupling=coupling,
-            parts={name: parts.get(name) for name in _PARTS},
+            parts=_parts(parts),
+        )
+        return _report(work, answer)
+
+
+def compare(
+    session: Path,
+    *,
+    laws: str | Sequence[str] = (),
+    delays: Sequence[float] | None = None,
+    jitter: Sequence[tuple[float, float]] | None = None,
+    loss: Sequence[float] | None = None,
+    grips: Sequence[float] | None = None,
+    at: float | None = None,
+    lambda_: float | None = None,
+    progress: Progress = True,
+    **parts: Any,
+) -> Report:
+    """Compares laws between master and slave, and the canceller, by the same hand over delays, jitter, loss and grips.
+
+    session: a graph file with an operator, or the bag of a run. laws: which; without it all, and the canceller.
+    delays: ms each way. jitter: pairs of mean and largest deviation, ms each way. loss: shares of lost packets, 0 to 1.
+    grips: factors on the grip's stiffness and damping. at: the delay at which loss and grips are tried, ms. An empty list leaves a kind out.
+    lambda_: the force scale. parts: other parts of the loop, as for `stability`.
+    """
+    with Work(progress) as work:
+        answer = work.answer(
+            _backdrive.compare,
+            os.fspath(session),
+            laws=_some(laws),
+            delays_ms=_list(delays),
+            jitter_ms=_list(jitter),
+            loss=_list(loss),
+            grips=_list(grips),
+            at_ms=at,
+            lambda_=lambda_,
+            parts=_parts(parts, without="script"),
         )
         return _report(work, answer)
 
@@ -242,7 +288,7 @@ def inspect(recordings: Any, *, rate: float | None = None, columns: Sequence[str
     """
     with Work(progress) as work:
         given = work.files(recordings, "recording")
-        return _report(work, work.answer(_backdrive.inspect, given, rate=rate, columns=None if columns is None else list(columns), time=time))
+        return _report(work, work.answer(_backdrive.inspect, given, rate=rate, columns=_list(columns), time=time))
 
 
 def _roles(work: Work, roles: Any) -> str | None:
@@ -308,4 +354,4 @@ def described(model: Model, grip: Any, amplitude: float | None) -> Any:
         return fields(text)
 
 
-__all__ = ["INTERRUPTED", "described", "diagnose", "export", "fit", "load_bag", "save_bag", "simulate", "stability", "why"]
+__all__ = ["INTERRUPTED", "compare", "described", "diagnose", "export", "fit", "load_bag", "save_bag", "simulate", "stability", "why"]

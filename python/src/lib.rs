@@ -36,6 +36,7 @@ fn _backdrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(verbs::fit_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::simulate_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::stability_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(verbs::compare_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::why_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::inspect_typed, module)?)?;
     module.add_function(wrap_pyfunction!(table::write_table, module)?)?;

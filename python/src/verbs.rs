@@ -3,6 +3,8 @@
 use crate::work::{Worked, worked};
 use backdrive::call::called;
 use backdrive::caller::Caller;
+use backdrive::compare::Done;
+use backdrive::compare::links::Links;
 use backdrive::diagnose;
 use backdrive::failure::{Failure, code};
 use backdrive::fit::Refit;
@@ -20,6 +22,8 @@ use backdrive_plant::recording::Recording;
 use backdrive_predict::fit::Options as Fitting;
 use backdrive_predict::simulate::Options as Running;
 use backdrive_stability::asked::Options as Judging;
+use backdrive_stability::compare::Rival;
+use backdrive_stability::compare::asked::Options as Comparing;
 use pyo3::exceptions::PyBaseException;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -31,6 +35,9 @@ use std::time::Duration;
 
 /// Samples per second of an excitation, where nothing else is asked.
 const USUAL_RATE: f64 = 5000.0;
+
+/// The columns of a table: headings, and the bytes of doubles.
+type Columns = Vec<(String, Py<PyBytes>)>;
 
 /// What a verb gave.
 #[pyclass(frozen, get_all)]
@@ -44,7 +51,7 @@ pub struct Answer {
     /// Files by name.
     files: Vec<(String, String)>,
     /// Tables by name: the heading of each column, and the bytes of its doubles.
-    tables: Vec<(String, Vec<(String, Py<PyBytes>)>)>,
+    tables: Vec<(String, Columns)>,
     /// The page, where one was asked for.
     html: Option<String>,
     /// What should be known before the results.
@@ -85,7 +92,7 @@ fn answered(
 }
 
 /// The columns of a table, the time first.
-fn columns(py: Python<'_>, table: &Recording) -> Vec<(String, Py<PyBytes>)> {
+fn columns(py: Python<'_>, table: &Recording) -> Columns {
     let bytes = |column: &[f64]| column.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let signals = table.signals.iter().map(|(name, samples)| (name.as_str(), samples.as_slice()));
     let all = std::iter::once(("t", table.t.as_slice())).chain(signals);
@@ -204,7 +211,7 @@ pub fn simulate_typed(
     })
 }
 
-/// Parts of a loop that are swapped, by their names on the command line; `None` leaves a part as it was recorded.
+/// Parts of a loop that are swapped, by their names on the command line; `None` keeps the recorded part.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Parts {
@@ -307,6 +314,48 @@ pub fn stability_typed(
         let how = Judging { recording, roles, changes: parts.overrides(coupling)?, gain, mu, lambda: lambda_, script, grips };
         let judged = Judged::of(&how, sweep.as_ref().map(|gains| gains.0.as_slice()), &caller.stop)?;
         Ok(Given { code: judged.code(&caller.stop), json: judged.json()?.to_string(), html: judged.html(), ..Given::default() })
+    })
+}
+
+/// Compares laws between master and slave, and the canceller, over links and grips.
+///
+/// # Errors
+/// As those of [`diagnose_typed`].
+#[pyfunction(name = "compare")]
+#[pyo3(signature = (session, *, laws, delays_ms, jitter_ms, loss, grips, at_ms, lambda_, parts, progress))]
+#[allow(clippy::too_many_arguments)] // the keywords of the function in Python
+pub fn compare_typed(
+    py: Python<'_>,
+    session: PathBuf,
+    laws: Vec<String>,
+    delays_ms: Option<Vec<f64>>,
+    jitter_ms: Option<Vec<[f64; 2]>>,
+    loss: Option<Vec<f64>>,
+    grips: Option<Vec<f64>>,
+    at_ms: Option<f64>,
+    lambda_: Option<f64>,
+    parts: Parts,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
+    answered(py, progress.as_ref(), move |caller| {
+        let rivals: Vec<&str> = Rival::all().into_iter().map(Rival::word).collect();
+        if let Some(law) = laws.iter().find(|law| !rivals.contains(&law.as_str())) {
+            return Err(usage(format!("laws has \"{law}\", and each must be one of {}", rivals.join(", "))));
+        }
+        positive("lambda_", lambda_)?;
+        let own = Links::default();
+        let links = Links {
+            delays_ms: delays_ms.unwrap_or(own.delays_ms),
+            jitter_ms: jitter_ms.unwrap_or(own.jitter_ms),
+            loss: loss.unwrap_or(own.loss),
+            grips: grips.unwrap_or(own.grips),
+            at_ms: at_ms.unwrap_or(own.at_ms),
+        };
+        links.check().map_err(usage)?;
+        let changes = Overrides { lambda: lambda_, ..parts.overrides(None)? };
+        let done = Done::of(&Comparing { session, laws, changes, conditions: links.conditions() }, &caller.stop)?;
+        let code = if caller.stop.load(Ordering::SeqCst) { code::INTERRUPTED } else { 0 };
+        Ok(Given { code, json: pretty(&done.json())?, html: Some(done.html()), ..Given::default() })
     })
 }
 

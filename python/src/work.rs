@@ -1,4 +1,4 @@
-//! Work in a thread of its own: the interpreter's lock is released, Ctrl-C is heard, and progress is told while it goes on.
+//! Work in a thread of its own: the interpreter's lock is released, Ctrl-C is heard, and progress is reported.
 
 use backdrive::caller::Caller;
 use pyo3::exceptions::PyRuntimeError;

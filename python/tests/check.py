@@ -206,6 +206,16 @@ class Package(unittest.TestCase):
         for name in table:
             numpy.testing.assert_array_equal(frame[name], table[name].to_numpy())
 
+    def test_a_comparison_is_that_of_the_command_line(self):
+        session = ROOT / "launch/coupling.toml"
+        told = json.loads(self.program("compare", session, "--laws", "wave", "--delays", "0,50", "--jitter", "none", "--loss", "none", "--grips", "1", "--json"))
+        compared = backdrive.compare(session, laws="wave", delays=[0, 50], jitter=[], loss=[], grips=[], progress=False)
+        self.assertEqual(dict(compared.data), told)
+        self.assertIn("<html", compared.html)
+        for wrong in ({"laws": "magic"}, {"delays": [-1.0]}, {"jitter": [(10, 20)]}, {"loss": [1.0]}, {"script": "x.toml"}):
+            with self.assertRaises(backdrive.UsageError):
+                backdrive.compare(session, progress=False, **wrong)
+
     def test_an_inspection_is_that_of_the_command_line(self):
         t = numpy.arange(1500) * 0.02
         frame = pandas.DataFrame({"t": t, "elbow.command": numpy.sin(1.3 * t), "elbow.position": -numpy.sin(1.3 * (t - 0.1))})

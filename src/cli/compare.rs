@@ -2,6 +2,7 @@
 
 use super::changes::SwappedParts;
 use super::values::{number, positive, rival};
+use crate::compare::links;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ pub struct Compare {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = rival())]
     pub laws: Vec<String>,
     /// Delays of the link, ms each way.
-    #[arg(long, value_name = "MS", value_delimiter = ',', value_parser = delay, default_values_t = [0.0, 20.0, 50.0, 100.0, 200.0])]
+    #[arg(long, value_name = "MS", value_delimiter = ',', value_parser = delay, default_values_t = links::DELAYS_MS)]
     pub delays: Vec<f64>,
     /// Delays with jitter: mean and largest deviation, ms each way; `none` for none.
     #[arg(long, value_name = "MEAN:DEVIATION", value_delimiter = ',', value_parser = jitter, default_value = "120:40")]
@@ -33,10 +34,10 @@ pub struct Compare {
     #[arg(long, value_name = "SHARE", value_delimiter = ',', value_parser = loss, default_value = "0.05,0.3")]
     pub loss: Vec<Loss>,
     /// Further factors on stiffness and damping of the grip, in addition to 1.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 1.3])]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = links::GRIPS)]
     pub grips: Vec<f64>,
     /// Delay for the comparison of loss and grips, ms each way.
-    #[arg(long, value_name = "MS", value_parser = delay, default_value_t = 20.0)]
+    #[arg(long, value_name = "MS", value_parser = delay, default_value_t = links::AT_MS)]
     pub at: f64,
     /// Force scale of the comparison; without this that of the session.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
@@ -60,14 +61,8 @@ pub struct Jitter(pub Option<[f64; 2]>);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss(pub Option<f64>);
 
-/// Longest delay of a link, ms.
-const LONGEST_MS: f64 = 5000.0;
-
 fn delay(text: &str) -> Result<f64, String> {
-    number(text).and_then(|ms| match (0.0..=LONGEST_MS).contains(&ms) {
-        true => Ok(ms),
-        false => Err(format!("must be from 0 to {LONGEST_MS} ms")),
-    })
+    number(text).and_then(links::delay)
 }
 
 fn jitter(text: &str) -> Result<Jitter, String> {
@@ -75,19 +70,12 @@ fn jitter(text: &str) -> Result<Jitter, String> {
         return Ok(Jitter(None));
     }
     let (mean, deviation) = text.split_once(':').ok_or("must be MEAN:DEVIATION in ms, such as 120:40, or none")?;
-    let (mean, deviation) = (delay(mean)?, delay(deviation)?);
-    if deviation > mean {
-        return Err("the deviation must not be above the mean: no packet arrives before it was sent".to_string());
-    }
-    Ok(Jitter(Some([mean, deviation])))
+    links::jitter([number(mean)?, number(deviation)?]).map(|both| Jitter(Some(both)))
 }
 
 fn loss(text: &str) -> Result<Loss, String> {
     if text == "none" {
         return Ok(Loss(None));
     }
-    number(text).and_then(|share| match (0.0..1.0).contains(&share) {
-        true => Ok(Loss(Some(share))),
-        false => Err("must be a share from 0 to below 1, such as 0.05, or none".to_string()),
-    })
+    number(text).and_then(links::loss).map(|share| Loss(Some(share)))
 }

@@ -1,5 +1,6 @@
 //! `backdrive compare`: the same session through each law between master and slave, and through the canceller.
 
+pub mod links;
 mod text;
 
 use crate::failure::{Failure, code};
@@ -7,45 +8,22 @@ use crate::{cli, interrupt, output, progress};
 use backdrive_nodes::graph::Overrides;
 use backdrive_pages::compare::compared::Compared;
 use backdrive_pages::compare::page;
+use backdrive_stability::compare::Cell;
 use backdrive_stability::compare::asked::{Asked, Options};
-use backdrive_stability::compare::{Cell, Condition, Varied};
-use serde_json::json;
-use std::sync::atomic::Ordering;
+use links::Links;
+use serde_json::{Value, json};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compares.
 pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
-    let loaded = progress::busy(&format!("reading {}", options.session.display()), || Asked::read(&resolved(options)))?;
     if let Some(html) = &options.html {
         output::writable(html)?;
     }
-    let comparison = &loaded.comparison;
-    let bar = progress::work();
-    bar.set_message("laws and links");
-    bar.set_length(comparison.cells() as u64);
-    let done = comparison.run(&|done| bar.set_position(done as u64), &cancel);
-    bar.finish_and_clear();
-    let cells: Vec<Cell> = done.map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?.into_iter().flatten().collect();
-    let gains = comparison.rivals.first().map_or([1.0, 0.0], |(_, graph)| [graph.gains.mu, graph.gains.lambda]);
-    let title = comparison.rivals.first().map_or("", |(_, graph)| graph.title.as_str());
-    let compared = Compared {
-        session: options.session.display().to_string(),
-        title,
-        gains,
-        highest: comparison.search.highest,
-        cells,
-        asked: comparison.cells(),
-        notes: &loaded.notes,
-    };
+    let done = Done::of(&resolved(options), &cancel)?;
+    let compared = done.compared();
     if options.json {
-        output::json(&json!({
-            "session": compared.session,
-            "mu": gains[0],
-            "lambda": gains[1],
-            "asked": compared.asked,
-            "notes": compared.notes,
-            "cells": compared.cells,
-        }))?;
+        output::json(&done.json())?;
     } else {
         output::line(text::text(&compared))?;
     }
@@ -60,23 +38,71 @@ pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// A comparison that was run, as far as it came.
+pub struct Done {
+    session: String,
+    asked: Asked,
+    cells: Vec<Cell>,
+}
+
+impl Done {
+    /// Compares.
+    ///
+    /// # Errors
+    /// The session or a change is wrong, or a loop cannot be run.
+    pub fn of(options: &Options, cancel: &AtomicBool) -> Result<Done, Failure> {
+        let session = options.session.display().to_string();
+        let asked = progress::busy(&format!("reading {session}"), || Asked::read(options))?;
+        let comparison = &asked.comparison;
+        let bar = progress::work();
+        bar.set_message("laws and links");
+        bar.set_length(comparison.cells() as u64);
+        let done = comparison.run(&|done| bar.set_position(done as u64), cancel);
+        bar.finish_and_clear();
+        let cells = done.map_err(|e| Failure::input(format!("{session}: {e}")))?.into_iter().flatten().collect();
+        Ok(Done { session, asked, cells })
+    }
+
+    /// For text and page.
+    fn compared(&self) -> Compared<'_> {
+        let comparison = &self.asked.comparison;
+        let graph = comparison.rivals.first().map(|(_, graph)| graph);
+        Compared {
+            session: self.session.clone(),
+            title: graph.map_or("", |graph| graph.title.as_str()),
+            gains: graph.map_or([1.0, 0.0], |graph| [graph.gains.mu, graph.gains.lambda]),
+            highest: comparison.search.highest,
+            cells: &self.cells,
+            asked: comparison.cells(),
+            notes: &self.asked.notes,
+        }
+    }
+
+    /// The result for programs.
+    pub fn json(&self) -> Value {
+        let Compared { session, gains: [mu, lambda], cells, asked, notes, .. } = self.compared();
+        json!({ "session": session, "mu": mu, "lambda": lambda, "asked": asked, "notes": notes, "cells": cells })
+    }
+
+    /// The text of the page.
+    pub fn html(&self) -> String {
+        output::html(page(&self.compared()))
+    }
+}
+
 /// The options of the work.
 fn resolved(options: &cli::Compare) -> Options {
+    let links = Links {
+        delays_ms: options.delays.clone(),
+        jitter_ms: options.jitter.iter().filter_map(|j| j.0).collect(),
+        loss: options.loss.iter().filter_map(|l| l.0).collect(),
+        grips: options.grips.clone(),
+        at_ms: options.at,
+    };
     Options {
         session: options.session.clone(),
         laws: options.laws.clone(),
         changes: Overrides { lambda: options.lambda, ..options.parts.overrides() },
-        conditions: conditions(options),
+        conditions: links.conditions(),
     }
-}
-
-fn conditions(options: &cli::Compare) -> Vec<Condition> {
-    let ms = |ms: f64| 1e-3 * ms;
-    let at = Condition::delay(ms(options.at));
-    let delays = options.delays.iter().map(|d| Condition::delay(ms(*d)));
-    let jitter = options.jitter.iter().filter_map(|j| j.0);
-    let jitter = jitter.map(|[mean, most]| Condition { varied: Varied::Jitter, jitter_s: ms(most), ..Condition::delay(ms(mean)) });
-    let loss = options.loss.iter().filter_map(|l| l.0).map(|loss| Condition { varied: Varied::Loss, loss, ..at.clone() });
-    let grips = options.grips.iter().filter(|g| **g != 1.0).map(|g| Condition { varied: Varied::Grip, grip_scale: *g, ..at.clone() });
-    delays.chain(jitter).chain(loss).chain(grips).collect()
 }

@@ -62,7 +62,7 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// Judges the loop of a recording; `sweep` are gain products at which it is run again.
+    /// Judges the loop of a recording; `sweep` are gain products of a re-simulation.
     ///
     /// # Errors
     /// The recording or an option is wrong, or the loop cannot be judged.
@@ -126,7 +126,7 @@ impl Judged {
     }
 }
 
-/// The loop run again at each gain.
+/// Re-simulation of the loop at each gain.
 fn swept(question: &Question, gains: &[f64], cancel: &AtomicBool) -> Result<Vec<Option<Point>>, Failure> {
     let bar = progress::work();
     bar.set_message("sweep");

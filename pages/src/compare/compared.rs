@@ -13,7 +13,7 @@ pub struct Compared<'a> {
     /// Highest mu*lambda up to which critical gains were searched.
     pub highest: f64,
     /// The cells that were done, condition by condition.
-    pub cells: Vec<Cell>,
+    pub cells: &'a [Cell],
     /// How many were asked for.
     pub asked: usize,
     /// What a reader has to know.

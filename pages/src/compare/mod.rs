@@ -48,7 +48,7 @@ pub fn page(compared: &Compared) -> Page {
     }
     page.section("All conditions");
     let mut table = Table::new(std::iter::once("link").chain(COLUMNS.map(|c| c.0)));
-    for cell in &compared.cells {
+    for cell in compared.cells {
         let mut cells = vec![Shown::from(cell.condition.text())];
         for (column, text) in row(cell, compared.highest).into_iter().enumerate() {
             cells.push(match column {
@@ -96,7 +96,7 @@ fn headline(compared: &Compared) -> (Tone, String) {
 /// The laws in the order of the table.
 fn laws<'a>(compared: &'a Compared) -> Vec<&'a str> {
     let mut laws: Vec<&str> = Vec::new();
-    for cell in &compared.cells {
+    for cell in compared.cells {
         if !laws.contains(&cell.rival.as_str()) {
             laws.push(&cell.rival);
         }
