@@ -114,7 +114,7 @@ fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
         }
     }
     if let Some(next) = &verdict.next_experiment {
-        steps.push(Step::said(format!("Record next: {}", next.sentence())));
+        steps.push(Step::said(format!("Next recording: {}", next.sentence())));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
         steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));

@@ -42,7 +42,7 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
         Word::CannotTell => {}
     }
     if let Some(next) = &found.verdict.next_experiment {
-        steps.push(Step::said(format!("Record next: {}", next_experiment(next))));
+        steps.push(Step::said(format!("Next recording: {}", next_experiment(next))));
     }
     if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
         steps.push(Step::said(format!("Check this signal: {remark}")));
