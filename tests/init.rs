@@ -176,7 +176,7 @@ fn what_is_missing_or_cannot_be_is_told_with_its_option_and_nothing_is_written()
         (with("--per-count", &[]), 2, "give --per-count: "),
         (with("--drive", &["--drive", "j"]), 2, "--drive \"j\": unknown column \"j\""),
         (with("--drive", &["--drive", "enc"]), 2, "a current (A) is needed"),
-        (with("--position", &["--position", "none"]), 2, "nothing is measured"),
+        (with("--position", &["--position", "none"]), 2, "without a measured signal"),
         (with("--position", &["--position", "enc", "--force", "i"]), 2, "--attached load"),
         (with("--position", &["--position", "enc", "--held-out", "other.csv"]), 2, "is not one of the recordings"),
         (with("--constant", &["--constant", "0"]), 2, "above 0"),

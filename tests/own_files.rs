@@ -77,9 +77,9 @@ fn an_unknown_unit_is_asked_for_by_name() {
     let grads = 200.0 / std::f64::consts::PI;
     recorded(&place, "time (ms),tau (Nm),q (grad)", 1000.0, grads);
     let of = ["--drive", "tau", "--position", "q"];
-    is_refused(&init(&place, &of), 2, &["say --position-unit", "\"grad\"", "is not known"]);
+    is_refused(&init(&place, &of), 2, &["give --position-unit", "\"grad\"", "is not known"]);
     recorded(&place, "time (h),tau (Nm),q (rad)", 1.0 / 3600.0, 1.0);
-    is_refused(&init(&place, &of), 2, &["say --time-unit", "\"h\" of its heading is not known"]);
+    is_refused(&init(&place, &of), 2, &["give --time-unit", "\"h\" of its heading is not known"]);
     // A stated unit is accepted.
     recorded(&place, "time (s),tau (Nm),q (gon)", 1.0, 1.0);
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "rad"]].concat()));
@@ -102,7 +102,7 @@ fn without_units_degrees_are_no_radians_and_milliseconds_no_seconds() {
     let done = init(&place, &of);
     is_right(&place, &done);
     assert!(
-        done.stdout.contains("assumed: tau in N m (--drive-unit), q in rad (--position-unit)") && !done.stdout.contains("fine"),
+        done.stdout.contains("assumed: tau in N m (--drive-unit), q in rad (--position-unit)") && !done.stdout.contains("passed"),
         "{done:?}"
     );
     // The same through a bag: what the table stated is known of the bag, and what it did not is not.
@@ -146,7 +146,7 @@ fn tables_without_a_heading_or_times_are_named_and_timed_by_options() {
         assert_eq!(import(&["--columns", "tau,q", "--rate", rate]).code, Some(2), "{rate}");
     }
     recorded(&place, "tau (Nm),q(deg)", 0.0, 180.0 / std::f64::consts::PI);
-    is_refused(&init(&place, &of), 2, &["say --time", "--rate HZ"]);
+    is_refused(&init(&place, &of), 2, &["give --time", "--rate HZ"]);
     is_refused(&import(&[]), 3, &["there is no column \"t\"", "--rate HZ"]);
     is_refused(&import(&named), 3, &["the table has a heading already (tau (Nm), q(deg)); leave --columns out"]);
     assert_eq!(import(&["--rate", "500"]).code, Some(0));
@@ -162,7 +162,7 @@ fn a_numpy_archive_is_read_by_the_names_of_its_arrays() {
     std::fs::copy(file("tests/cases/npz/log.npz"), place.path("mine/log.npz")).unwrap();
     let done = place.backdrive(&["bag", "import", "mine/log.npz", "--bag", "log.mcap"]);
     assert!(done.code == Some(0) && done.stdout.contains("400 rows, 8 topics"), "{done:?}");
-    assert!(done.stderr.contains("left out") && done.stderr.contains("who (text), gain"), "{done:?}");
+    assert!(done.stderr.contains("omitted") && done.stderr.contains("who (text), gain"), "{done:?}");
     let at = |topic: &str| samples(&place.path("log.mcap"), &format!("/recording/{topic}"))[100].position[0];
     let (angle, torque) = swing(1.0, 0.5);
     for (topic, meant) in [

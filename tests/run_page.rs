@@ -20,7 +20,7 @@ fn a_run_in_one_process_and_its_replay_have_a_page() {
         "Stable at μλ = 0.3",
         "What to do now",
         "backdrive stability run.mcap",
-        "the slave touches",
+        "contact for",
         "master x_m",
         "on the slave F_s",
         "one process",

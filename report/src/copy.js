@@ -18,4 +18,12 @@ document.querySelectorAll('.todo pre').forEach(function (pre) {
     else byHand();
   };
   pre.append(button);
+  // A line of a command ends between words, not behind the hyphens of an option.
+  var code = pre.querySelector('code');
+  code.replaceChildren.apply(code, code.textContent.split(/(\s+)/).map(function (word) {
+    if (word.length > 32 || !word.trim()) return document.createTextNode(word);
+    var whole = document.createElement('span');
+    whole.textContent = word;
+    return whole;
+  }));
 });

@@ -87,7 +87,7 @@ thead th,thead th.num{white-space:normal}thead th{min-width:4.5rem;border-bottom
 .some{min-width:8rem}.long{min-width:12rem}.num{text-align:right;white-space:nowrap}.mid{text-align:center}td.tone{color:var(--ct);font-weight:600}\n\
 figure{margin:20px 0;position:relative}figcaption{color:var(--muted);font-size:.92rem;max-width:85ch;margin-top:4px}\
 .todo li{margin:6px 0}.todo pre{position:relative;margin:4px 0;padding:8px 60px 8px 12px;background:var(--paper);border:1px solid var(--faint);border-radius:4px;\
-font-size:.88rem;white-space:pre}.todo pre code{display:block;overflow-x:auto}.copy{position:absolute;top:4px;right:4px;font:inherit;font-size:.78rem;color:var(--ink);background:var(--soft);\
+font-size:.88rem;white-space:pre-wrap;overflow-wrap:anywhere}.todo code span{white-space:nowrap}.copy{position:absolute;top:4px;right:4px;font:inherit;font-size:.78rem;color:var(--ink);background:var(--soft);\
 border:1px solid var(--faint);border-radius:4px;cursor:pointer}\n\
 details{margin:12px 0;border:1px solid var(--faint);border-radius:6px;padding:0 14px}summary{cursor:pointer;padding:8px 0;font-weight:600}\n\
 @media (max-width:720px){.long{min-width:15rem}body{font-size:15px}.lead{font-size:1.12rem}}\n\

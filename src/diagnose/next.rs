@@ -53,7 +53,7 @@ fn of_one_axis(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
         Word::CannotTell => {}
     }
     if let Some(next) = &found.verdict.next_experiment {
-        steps.push(Step::said(format!("Record next: {}", next_experiment(next))));
+        steps.push(Step::said(format!("Next recording: {}", next_experiment(next))));
     }
     if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
         steps.push(Step::said(format!("Check this signal: {remark}")));
@@ -95,7 +95,7 @@ fn of_arm(verdict: &Verdict, out: &Path) -> Vec<Step> {
         }
     }
     if let Some(next) = &verdict.next_experiment {
-        steps.push(Step::said(format!("Record next: {}", next.sentence())));
+        steps.push(Step::said(format!("Next recording: {}", next.sentence())));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
         steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));

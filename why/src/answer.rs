@@ -258,7 +258,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     if !shakes_again {
         return Ok(());
     }
-    hear("what would stop it");
+    hear("trying remedies");
     answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, &answer.causes, cancel)?;
     Ok(())
 }

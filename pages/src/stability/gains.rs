@@ -50,7 +50,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
             if answer.margins.and_then(|m| m.critical).is_some_and(|c| c.factor < 1.0) { -distance } else { distance }
         };
         let distance: Vec<f64> = gains.iter().map(signed).collect();
-        let mut plot = Plot::new("").y_axis("distance of L from +1, measured (below 0: above the stability limit)", "").include_y(0.0);
+        let mut plot = Plot::new("").y_axis("distance of L from +1", "").include_y(0.0);
         plot = plot.y_limits(-1.0, 1.0).line("", &gains, &distance);
         plots.push(plot);
     }
@@ -83,7 +83,8 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         ),
         (true, None) => "From the measured frequency response alone.".to_string(),
     };
-    page.figure(Figure::stacked(plots), &what);
+    let below = if measured.is_some() { " The distance of L from +1 is negative above the stability limit." } else { "" };
+    page.figure(Figure::stacked(plots), &format!("{what}{below}"));
     if let Some(again) = again {
         grips(page, again, asked);
     }

@@ -45,7 +45,7 @@ pub fn check(plan: &Plan, records: &[Recording]) -> Result<Option<String>, InitE
             signal.assumed.as_ref().map(|(option, unit)| format!("{} in {} (--{option})", signal.column.short_name(), unit.name))
         })
         .collect();
-    Ok((!assumed.is_empty()).then(|| format!("units are assumed where none is stated: {}", assumed.join(", "))))
+    Ok((!assumed.is_empty()).then(|| format!("units not stated, assumed: {}", assumed.join(", "))))
 }
 
 /// The largest of what a signal spans and how far it is from 0.

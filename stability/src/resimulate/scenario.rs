@@ -67,7 +67,7 @@ impl Scenario {
             return Err(ResimulateError::OwnProgram { node: node.name.clone(), option });
         }
         let steps = steps.or(graph.timing.steps).ok_or(ResimulateError::NoLength { graph: name })?;
-        let script = if intents.is_some() { "the bag's own intent" } else { "the graph's own operator" };
+        let script = if intents.is_some() { "the recorded hand" } else { "the graph's operator" };
         if let Some(intents) = intents {
             graph.nodes[operator].settings = Settings::Operator(intents);
         }
