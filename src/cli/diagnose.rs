@@ -42,11 +42,11 @@ pub struct Diagnose {
     #[arg(long, value_name = "KIND", value_parser = effect)]
     pub without: Vec<String>,
     /// How many physics may be missing at once, at most; more take more time. Without this 3, of an arm 8
-    /// beside constant, dry and viscous friction and armature.
+    /// beside constant, dry and viscous friction and armature, of servo joints any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     pub effects: Option<u8>,
     /// How much to search, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends on this alone, and is the same
-    /// on every machine. Of an arm everything is tried whatever this says.
+    /// on every machine. For an arm and servo joints it has no effect: everything is tried.
     #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
     pub effort: Option<f64>,
     /// A limit on the clock; without this 600 s, and none for an arm and for servo joints. Where it cuts the search off, the verdict may depend on the
