@@ -143,3 +143,40 @@ pub(crate) fn of_servo(asked: &Asked) -> Result<Vec<String>, AnswerError> {
 fn gripped(asked: &Asked) -> Option<&Path> {
     asked.grip.as_deref().filter(|grip| *grip != Path::new("none"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_diagnosis::options::Options;
+    use std::path::PathBuf;
+
+    fn asked(options: Options) -> Asked {
+        Asked { options, ..Asked::default() }
+    }
+
+    #[test]
+    fn values_that_no_device_takes_are_wrong_usage() {
+        assert!(refuse_wrong(&asked(Options::default())).is_ok());
+        let magic = Options { without: vec!["magic".to_string()], ..Options::default() };
+        let many = Options { effects: Some(9), ..Options::default() };
+        let none = Options { effort: Some(0.0), ..Options::default() };
+        for (options, word) in [(magic, "magic"), (many, "1 to 8"), (none, "above 0")] {
+            match refuse_wrong(&asked(options)) {
+                Err(AnswerError::Usage(message)) => assert!(message.contains(word), "{message}"),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn an_effect_of_arms_is_refused_of_one_axis_and_without_effect_for_servo_joints() {
+        let payload = || asked(Options { without: vec!["gravity_direction".to_string()], ..Options::default() });
+        assert!(matches!(refuse_of_one_axis(&payload()), Err(AnswerError::Usage(_))));
+        let notes = of_servo(&payload()).unwrap();
+        assert!(notes.len() == 1 && notes[0].starts_with("--without gravity_direction does nothing for servo joints"), "{notes:?}");
+        let grip = Asked { grip: Some(PathBuf::from("grip.toml")), ..Asked::default() };
+        assert!(matches!(of_servo(&grip), Err(AnswerError::Usage(_))));
+        let no_hand = Asked { grip: Some(PathBuf::from("none")), ..Asked::default() };
+        assert_eq!(of_servo(&no_hand).unwrap(), Vec::<String>::new());
+    }
+}

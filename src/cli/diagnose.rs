@@ -41,12 +41,12 @@ pub struct Diagnose {
     /// An effect to exclude, together with all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = effect)]
     pub without: Vec<String>,
-    /// Largest number of missing effects; more take more time. Without this 3, for an arm 8
-    /// in addition to constant torque, dry and viscous friction and armature.
+    /// Largest number of missing effects; more take more time. Without this 3; for an arm 8
+    /// in addition to constant torque, dry and viscous friction and armature; for servo joints any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     pub effects: Option<u8>,
     /// Search effort, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends only on this and is the same
-    /// on every machine. For an arm it has no effect: everything is tried.
+    /// on every machine. For an arm or servo joints it has no effect: everything is tried.
     #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
     pub effort: Option<f64>,
     /// Time limit, s; without this 600 s, and none for an arm or servo joints. If it ends the search, the verdict may depend on the machine and reports
