@@ -63,6 +63,8 @@ group! {
         softened: f64 = 20.0, "criterion", Judgement("an information criterion requires 2; a simulator never equals the device");
         /// Confidence that a finding has at most where held-out recordings are predicted worse with it than by the model as given.
         as_likely: f64 = 0.5, "probability", Judgement("as likely as not");
+        /// Confidence from which a finding is asserted apart from those that the recordings leave open.
+        asserted: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
         /// Alternatives that are listed.
         alternatives: usize = 6, "structures", Cost("more are not readable");
         /// Share of a finding's confidence from which a rival is named in the sentence.

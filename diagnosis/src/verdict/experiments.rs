@@ -2,7 +2,7 @@
 
 use super::remaining::next_effect;
 use super::rounded::rounded;
-use super::types::{NextExperiment, Planned, Refused, Sensor, Word};
+use super::types::{Finding, NextExperiment, Planned, Refused, Sensor, Word};
 use crate::belief::choice::{exchanged, nearest, richer};
 use crate::belief::decision::Decision;
 use crate::belief::intervals::NORMAL_975;
@@ -47,7 +47,12 @@ fn planned<'a, 's>(
             }
             Err(reason) => {
                 // Where all say the same of the kind of physics and of its place, that is said; else nobody can tell.
-                decision.word = if rivals.iter().all(|c| is_kin(best, c)) { Word::Missing } else { Word::CannotTell };
+                let is_known = decision.findings.iter().any(Finding::is_sure);
+                decision.word = match rivals.iter().all(|c| is_kin(best, c)) {
+                    true => Word::Missing,
+                    false if is_known => Word::Ambiguous,
+                    false => Word::CannotTell,
+                };
                 inseparable = Some(reason);
             }
         }

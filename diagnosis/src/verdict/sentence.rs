@@ -52,18 +52,11 @@ fn without_reserve(decision: &Decision, planned: bool) -> String {
     let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match decision.word {
         Word::Ambiguous => {
-            let others = match findings.get(1..) {
-                Some(others) if !others.is_empty() => {
-                    format!(", besides {}", others.iter().map(asserted).collect::<Vec<_>>().join(", and "))
-                }
-                _ => String::new(),
-            };
             let next = if planned { ", the next experiment would" } else { "" };
-            let what = findings.first().map_or_else(|| "something".to_string(), known);
-            format!("the model leaves out {what}{others}: the recordings do not separate them{next}{still}{unseen}")
+            format!("the model leaves out {}: the recordings do not separate them{next}{still}{unseen}", sure_then_open(findings))
         }
         Word::CannotTell if !findings.is_empty() => {
-            let what = findings.first().map_or_else(|| "something".to_string(), known);
+            let what = sure_then_open(findings);
             format!("the model leaves out {what}: neither these recordings nor a planned experiment can separate them{still}{unseen}")
         }
         Word::CannotTell => "the device hardly moves in the recordings: they do not show what is missing".to_string(),
@@ -82,6 +75,21 @@ fn without_reserve(decision: &Decision, planned: bool) -> String {
         ),
         Word::NothingMissing => format!("the model explains the recordings {end}"),
     }
+}
+
+/// What is sure, and what is one of several: of the first open finding its rivals too.
+fn sure_then_open(findings: &[Finding]) -> String {
+    let joined =
+        |findings: &[&Finding], words: fn(&Finding) -> String| findings.iter().map(|f| words(f)).collect::<Vec<_>>().join(", and ");
+    let (sure, open): (Vec<&Finding>, Vec<&Finding>) = findings.iter().partition(|f| f.is_sure());
+    let (sure, open) = if open.is_empty() { (Vec::new(), sure) } else { (sure, open) };
+    let Some((first, others)) = open.split_first() else { return "an effect".to_string() };
+    let mut text = if sure.is_empty() { String::new() } else { format!("{}; it may also leave out ", joined(&sure, words::finding)) };
+    text += &known(first);
+    if !others.is_empty() {
+        text += &format!(", besides {}", joined(others, asserted));
+    }
+    text
 }
 
 /// A finding in words; where a rival is more likely, what is known of both.
@@ -107,6 +115,34 @@ mod tests {
     use super::*;
     use crate::verdict::types::Alternative;
     use std::collections::BTreeMap;
+
+    #[test]
+    fn what_is_sure_is_asserted_apart_from_what_is_one_of_several() {
+        let finding = |physics: &str, confidence: f64, rival: Option<(&str, f64)>| {
+            let place = Place::Between("motor".to_string(), "ground".to_string());
+            let alternatives =
+                rival.map(|(physics, confidence)| Alternative { physics: physics.to_string(), place: place.clone(), confidence });
+            Finding {
+                physics: physics.to_string(),
+                place: place.clone(),
+                parameters: BTreeMap::new(),
+                replaces: Vec::new(),
+                confidence,
+                family: None,
+                family_confidence: 0.0,
+                alternatives: alternatives.into_iter().collect(),
+                closed_loop: None,
+            }
+        };
+        let open = finding("stribeck", 0.5, Some(("coulomb", 0.45)));
+        let sure = finding("cogging", 0.99, None);
+        assert_eq!(
+            sure_then_open(&[open.clone(), sure.clone()]),
+            format!("{}; it may also leave out {}", words::finding(&sure), known(&open))
+        );
+        assert_eq!(sure_then_open(std::slice::from_ref(&open)), known(&open));
+        assert_eq!(sure_then_open(std::slice::from_ref(&sure)), known(&sure));
+    }
 
     #[test]
     fn a_finding_that_is_less_likely_than_its_rival_is_not_asserted() {

@@ -2,6 +2,7 @@
 
 use super::place::PlaceInFile;
 use crate::hypothesis::{Family, Place};
+use crate::tuning::tuning;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,6 +40,11 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// Whether it is claimed with confidence: its own confidence is at least that of a sure claim, and no alternative is as likely.
+    pub fn is_sure(&self) -> bool {
+        self.confidence >= tuning().claim.asserted && !self.has_likelier_rival()
+    }
+
     /// Whether one of its alternatives is at least as likely as itself: then it is not asserted.
     pub fn has_likelier_rival(&self) -> bool {
         self.alternatives.iter().any(|rival| rival.confidence >= self.confidence)
