@@ -346,7 +346,7 @@ fn attachments_that_are_missing_double_or_changed_are_noticed() {
     let mut gone = bag.clone();
     gone.attachments.retain(|(name, _)| name != "slave.toml");
     let done = check(&gone, &path);
-    assert!(done.code == Some(4) && done.stdout.contains("names the file \"slave.toml\""), "{done:?}");
+    assert!(done.code == Some(4) && done.stdout.contains("lists the file \"slave.toml\""), "{done:?}");
     let mut double = bag.clone();
     double.attachments.push(("slave.toml".to_owned(), b"name = \"other\"\n".to_vec()));
     let done = check(&double, &path);

@@ -122,7 +122,7 @@ fn what_a_bag_lacks_is_said() {
         Session::from_bag(&Reader::open(&path).unwrap(), &graph)
     };
     let error = without("/slave/measured_js").unwrap_err().to_string();
-    assert!(error.contains("F_s") && error.contains("/slave/measured_js") && error.contains("what the slave touches"), "{error}");
+    assert!(error.contains("F_s") && error.contains("/slave/measured_js") && error.contains("contact and the loop"), "{error}");
     let error = without("/slave/servo_jp").unwrap_err().to_string();
     assert!(error.contains("x_c"), "{error}");
     for (topic, says) in [("/scaling/dither_jf", "the dither is missing"), ("/operator/setpoint_js", "intent is missing")] {
@@ -168,7 +168,7 @@ fn gains_follow_what_was_in_force() {
     record(&graph, &heard, &path, |topic, _| topic != "/scaling/gains");
     let planned = Session::from_bag(&Reader::open(&path).unwrap(), &graph).unwrap();
     assert_eq!((planned.mu, planned.lambda), (told.mu, told.lambda), "the plan ramps as the scaling does");
-    assert!(told.axes[0].dither.is_none() && told.notes.iter().any(|n| n.contains("runs from")), "{:?}", told.notes);
+    assert!(told.axes[0].dither.is_none() && told.notes.iter().any(|n| n.contains("changes from")), "{:?}", told.notes);
 }
 
 #[test]

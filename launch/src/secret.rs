@@ -72,7 +72,7 @@ mod tests {
         }
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRUSR | nix::sys::stat::Mode::S_IWUSR).unwrap();
-        assert!(read(&pipe).unwrap_err().contains("no regular file"));
+        assert!(read(&pipe).unwrap_err().contains("not a regular file"));
         assert!(read(folder.path()).is_err());
     }
 }

@@ -291,7 +291,7 @@ mod tests {
             assert!(what.iter().all(|w| error.contains(w)), "{error}");
         };
         says("[signal]\n", &["r.toml:1", "signals"]);
-        says(&GOOD.replace("F_s = [\"/s.wrench.force.x\", \"/s.wrench.force.y\"]\n", ""), &["F_s", "what the slave touches"]);
+        says(&GOOD.replace("F_s = [\"/s.wrench.force.x\", \"/s.wrench.force.y\"]\n", ""), &["F_s", "contact and the loop"]);
         says(&GOOD.replace("\"/c.data[1]\"", "\"/c/data\""), &["r.toml:5", "x_c", "TOPIC.FIELD"]);
         says(&GOOD.replace(", \"/c.data[1]\"", ""), &["r.toml:5", "x_c", "has 1 axes, but x_m has 2"]);
         says(&GOOD.replace("scale = -1.0", "skale = -1.0"), &["r.toml:4", "did you mean \"scale\""]);
