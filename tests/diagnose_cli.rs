@@ -286,7 +286,7 @@ fn what_cannot_be_diagnosed_is_told_in_one_line() {
         (&["nothing", "--model", "model.toml"], &["nothing", "no recordings"]),
         (&["held"], &["set.toml", "b.csv", "no file"]),
         (&["absent"], &["absent", "no such file"]),
-        (&["fine.csv", "held", "--model", "model.toml"], &["held", "no recording"]),
+        (&["fine.csv", "held", "--model", "model.toml"], &["held", "not a recording"]),
         (&["fine.csv", "--model", "missing.toml"], &["missing.toml"]),
     ];
     for (arguments, says) in cases {
