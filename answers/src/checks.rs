@@ -26,7 +26,7 @@ pub fn effect(name: &str) -> Result<String, String> {
     let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
     let more = |names: Vec<&'static str>| names.into_iter().filter(|n| !known.contains(n)).collect::<Vec<_>>().join(", ");
     let (arms, servos) = (more(of_arms().collect()), more(of_servos().collect()));
-    Err(format!("no such physics; there are {}; of arms also {arms}; of position servos also {servos}", known.join(", ")))
+    Err(format!("no such effect; there are {}; for arms also {arms}; for position servos also {servos}", known.join(", ")))
 }
 
 /// Refuses options with values that they cannot have for any device.
@@ -69,47 +69,47 @@ pub(crate) fn refuse_of_one_axis(asked: &Asked) -> Result<(), AnswerError> {
 pub(crate) fn of_arm(asked: &Asked, set: &RecordingSet) -> Result<Vec<String>, AnswerError> {
     if let Some(grip) = gripped(asked) {
         return Err(AnswerError::Usage(format!(
-            "--grip {}: a hand on an arm is not modelled by its diagnosis; omit the option, and record the arm without a hand",
+            "--grip {}: the diagnosis of an arm does not model a hand; omit the option, and record the arm without a hand",
             grip.display()
         )));
     }
     let file = set.folder.join("set.toml");
     if let Some((input, _)) = set.unknown.first() {
         return Err(AnswerError::Input(format!(
-            "{}, unknown.{input}: an arm is diagnosed from the torque of every joint, and none may be unknown; leave the key out",
+            "{}, unknown.{input}: an arm is diagnosed from the torque of every joint, and none may be unknown; omit the key",
             file.display()
         )));
     }
     let conditions = set.files.iter().find_map(|(name, rules)| Some((name, &rules.condition.first()?.0)));
     if let Some((name, path)) = conditions {
         return Err(AnswerError::Input(format!(
-            "{}, files.\"{name}\".condition.{path}: logs of an arm are all fitted with the same numbers; diagnose those with another {path} in a set \
-             of their own",
+            "{}, files.\"{name}\".condition.{path}: all logs of an arm are fitted with the same parameters; diagnose those with another \
+             {path} in a separate set",
             file.display()
         )));
     }
     let mut out = Vec::new();
     if asked.options.effort.is_some() {
-        out.push("--effort does nothing for an arm: every physics is tried at every joint, and the search ends by itself".to_string());
+        out.push("--effort has no effect for an arm: every effect is tried at every joint".to_string());
     }
     for name in &asked.ignore_signal {
-        out.push(format!("--ignore-signal {name} does nothing for an arm: of its logs only the columns of its joints are read"));
+        out.push(format!("--ignore-signal {name} has no effect for an arm: only the columns of its joints are read from its logs"));
     }
     let of_arms: Vec<&str> = OF_ARMS.iter().map(|p| p.facts().name).collect();
     for name in asked.options.without.iter().filter(|name| !of_arms.contains(&name.as_str())) {
-        out.push(format!("--without {name} does nothing for an arm, whose search has {}", of_arms.join(", ")));
+        out.push(format!("--without {name} has no effect for an arm, whose search has {}", of_arms.join(", ")));
     }
     for name in &set.ignore {
         out.push(format!(
-            "{}, ignore: \"{name}\" does nothing for an arm: of its logs only the columns of its joints are read",
+            "{}, ignore: \"{name}\" has no effect for an arm: only the columns of its joints are read from its logs",
             file.display()
         ));
     }
     if set.initial == Initial::Free {
-        out.push(format!("{}, initial: does nothing for an arm, which may start in any state", file.display()));
+        out.push(format!("{}, initial: has no effect for an arm, which may start in any state", file.display()));
     }
     if set.mixed_rates {
-        out.push(format!("{}, mixed_rates: does nothing for an arm: all its logs are laid on the grid of the slowest", file.display()));
+        out.push(format!("{}, mixed_rates: has no effect for an arm: all its logs are resampled to the slowest", file.display()));
     }
     Ok(out)
 }
@@ -125,16 +125,14 @@ pub(crate) fn of_servo(asked: &Asked) -> Result<Vec<String>, AnswerError> {
     }
     let mut out = Vec::new();
     if asked.options.effort.is_some() {
-        out.push(
-            "--effort does nothing for servo joints: every physics is tried at every joint, and the search ends by itself".to_string(),
-        );
+        out.push("--effort has no effect for servo joints: every effect is tried at every joint".to_string());
     }
     for name in &asked.ignore_signal {
-        out.push(format!("--ignore-signal {name} does nothing for servo joints: only commands and positions are read"));
+        out.push(format!("--ignore-signal {name} has no effect for servo joints: only commands and positions are read"));
     }
     let of_servos: Vec<&str> = OF_SERVOS.iter().map(|p| p.name).collect();
     for name in asked.options.without.iter().filter(|name| !of_servos.contains(&name.as_str())) {
-        out.push(format!("--without {name} does nothing for servo joints, whose search has {}", of_servos.join(", ")));
+        out.push(format!("--without {name} has no effect for servo joints, whose search has {}", of_servos.join(", ")));
     }
     Ok(out)
 }
@@ -173,7 +171,7 @@ mod tests {
         let payload = || asked(Options { without: vec!["gravity_direction".to_string()], ..Options::default() });
         assert!(matches!(refuse_of_one_axis(&payload()), Err(AnswerError::Usage(_))));
         let notes = of_servo(&payload()).unwrap();
-        assert!(notes.len() == 1 && notes[0].starts_with("--without gravity_direction does nothing for servo joints"), "{notes:?}");
+        assert!(notes.len() == 1 && notes[0].starts_with("--without gravity_direction has no effect for servo joints"), "{notes:?}");
         let grip = Asked { grip: Some(PathBuf::from("grip.toml")), ..Asked::default() };
         assert!(matches!(of_servo(&grip), Err(AnswerError::Usage(_))));
         let no_hand = Asked { grip: Some(PathBuf::from("none")), ..Asked::default() };

@@ -66,7 +66,7 @@ pub fn diagnose(
     let (problem, dead) = problem.without_dead_outputs();
     for signal in dead {
         remarks.retain(|r| !(r.about == "constant" && r.signal == signal));
-        let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
+        let text = "is constant while others change: it is excluded from every fit and from the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
     let (problem, contradicted) = without_contradicted(problem);
@@ -80,7 +80,7 @@ pub fn diagnose(
     let location = located(&problem, &search);
     report("deciding");
     let (verdict, files) = verdict(&problem, &search, &remarks, location.as_ref(), limit)?;
-    report("fitting each record by itself");
+    report("fitting each record alone");
     let per_record = fit_each(&problem, &search.nominal, &search.noise_sd, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
@@ -198,8 +198,8 @@ fn with_inputs_as_they_run(
     }
     for input in running {
         let signal = problem.model.inputs.get(input).map_or_else(String::new, |i| i.name.clone());
-        let text = "runs on in straight lines between its samples, as the recordings say, and is not held as it is by default: it was simulated so; say hold = \"linear\" in \
-                    the model file"
+        let text = "runs linearly between its samples in these recordings, and is not held, which is the default. It was simulated so; set hold = \"linear\" in the \
+                    model file"
             .to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "hold", text });
     }

@@ -39,7 +39,7 @@ pub fn worked<T: Send + 'static>(
         // There is no listener any more where the call was interrupted.
         let _ = done.send(work(&theirs));
     })?;
-    let gone = || PyRuntimeError::new_err("the work ended with a fault of backdrive's own; what it said of it stands on standard error");
+    let gone = || PyRuntimeError::new_err("internal error of backdrive; see standard error");
     loop {
         match py.detach(|| heard(&result, LOOK)) {
             Ok(result) => return Ok(Worked { result: Some(result), raised: None }),

@@ -49,14 +49,14 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
     let unseen = if held { "held-out" } else { "fitted" };
     let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
-    let tail = format!("of the {unseen} torque {} remain unexplained (by joint)", left.join(", "));
+    let tail = format!("of the {unseen} torque {} remain unexplained, by joint", left.join(", "));
     let open: Vec<String> = arm.joints.iter().filter_map(unexplained).collect();
     let mut besides = if open.is_empty() { String::new() } else { format!(" No tested effect explains {}.", open.join("; ")) };
     if !unsigned.is_empty() {
         besides += &format!(" Nothing is claimed at {}: its torque was logged without its sign.", unsigned.join(", "));
     }
     match word {
-        Word::Missing => format!("The model leaves out {}; {tail} ({} without).{besides}", named.join(", "), before.join(", ")),
+        Word::Missing => format!("The model leaves out {}; {tail} (without: {}).{besides}", named.join(", "), before.join(", ")),
         Word::Ambiguous => {
             let other = findings.first().and_then(|f| f.alternatives.first());
             let named = named.join(", ");
@@ -67,7 +67,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
                 }
                 None => format!("may leave out {named}, but held-out torque or a closed-loop simulation does not confirm it"),
             };
-            format!("The model {open}; {tail} ({} without).{besides}", before.join(", "))
+            format!("The model {open}; {tail} (without: {}).{besides}", before.join(", "))
         }
         Word::Unexplained => format!("An effect is missing that none of the tested effects explains: {}.", open.join("; ")),
         Word::Parameters => format!("No effect is missing; the model's parameters are wrong, and refitted {tail}."),
