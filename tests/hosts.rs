@@ -424,7 +424,7 @@ fn hosts_without_the_same_secret_do_not_hear_each_other() {
         Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap();
         let (_, code, told) = end(run, Duration::from_secs(30));
         assert_eq!(code, Some(130), "{told}");
-        assert!(told.contains("does not have") && told.contains("secret"), "{}: {told}", HOSTS[host]);
+        assert!(told.contains("without this run's secret"), "{}: {told}", HOSTS[host]);
     }
     // And without any there is no beginning.
     let mut without = hosts.on(0, env!("CARGO_BIN_EXE_backdrive"));

@@ -1,11 +1,12 @@
 //! Clean recordings of many kinds, three in four with one thing wrong: what is found, and what is found that is not there.
 //!
 //! Thresholds were chosen on the seeds 1 to 300, of which the usual run draws 60. `BACKDRIVE_LONG=1` draws 400 that no threshold was chosen on, and
-//! `BACKDRIVE_SEEDS=FROM-TO` others.
+//! `BACKDRIVE_SEEDS=FROM-TO` others. `BACKDRIVE_SEALED_OUT=DIR` also writes each draw, for `tests/python/doctor_on_sealed.py`.
 
 mod corrupt;
 mod draw;
 mod real;
+mod written;
 
 use backdrive_inspect::{Finding, FindingKind, Options, Source, inspect};
 use corrupt::{Corrupted, MORE, NAMES, corrupt, halves};
@@ -54,6 +55,11 @@ fn draw(seed: u64, real: &[Clean]) -> Outcome {
         None if random.chance(0.3) => halves(&base.columns),
         None => vec![base.columns.clone()],
     };
+    if let Some(folder) = written::folder().map(|folder| folder.join(seed.to_string())) {
+        written::write(&folder, "clean", std::slice::from_ref(&base.columns));
+        written::write(&folder, "drawn", &pieces);
+        std::fs::write(folder.join("truth.txt"), corrupted.as_ref().map_or("clean", |c| c.name)).unwrap();
+    }
     let samples: usize = pieces.iter().map(|piece| piece[0].values.len()).sum();
     let sources = sources(pieces);
     let started = Instant::now();
@@ -67,6 +73,9 @@ fn draw(seed: u64, real: &[Clean]) -> Outcome {
         })
     };
     let found = report.wrong().any(is_right);
+    if let Some(folder) = written::folder().map(|folder| folder.join(seed.to_string())) {
+        std::fs::write(folder.join("inspect.txt"), if found { "found" } else { "not found" }).unwrap();
+    }
     let others = report.wrong().filter(|finding| !is_right(finding)).cloned().collect();
     let said = report.wrong().map(|finding| finding.kind).collect();
     Outcome { seed, kind: base.kind, corruption: corrupted.map(|c| c.name), found, others, seconds, said }
