@@ -2,12 +2,12 @@
 
     import backdrive
     verdict = backdrive.diagnose({"a": frame_a, "b": frame_b}, "model.toml", held_out=frame_c)
-    print(verdict)                      # as the command line tells it; in a notebook `verdict` alone shows the report
+    print(verdict)                      # the text of the command line; in a notebook `verdict` alone shows the report
     verdict.model.write("better.toml")  # the model with what was found
 
 A recording is a path (a set's folder, `set.toml`, CSV, MCAP, parquet, MAT), or columns: a pandas or polars frame, a dictionary of arrays, a structured NumPy array.
-Its column `t` is the time in s; the others are called as the model's inputs and outputs, in SI units, unless `columns` says otherwise. The work is that of
-the command line `backdrive`, with the same numbers to the last bit; other threads of Python go on meanwhile, and Ctrl-C ends it.
+Its column `t` is the time in s; the others have the names of the model's inputs and outputs, in SI units, unless `columns` states otherwise. Results equal those
+of the command line `backdrive` to the last bit. Other Python threads continue meanwhile, and Ctrl-C stops the work.
 """
 
 from ._backdrive import __version__

@@ -18,7 +18,7 @@ def remarks(t: Any, name: str) -> list[str]:
     if len(steps) == 0:
         return [f"{name}: has fewer than two samples"]
     if not numpy.isfinite(steps).all():
-        return [f"{name}: {int((~numpy.isfinite(t)).sum())} times are no numbers"]
+        return [f"{name}: {int((~numpy.isfinite(t)).sum())} times are not numbers"]
 
     def first(where: Any) -> str:
         row = int(numpy.argmax(where))
@@ -26,7 +26,7 @@ def remarks(t: Any, name: str) -> list[str]:
 
     same, back = steps == 0.0, steps < 0.0
     if same.any():
-        out.append(f"{name}: the clock stands still {int(same.sum())} times, {first(same)}: leave out what was recorded twice")
+        out.append(f"{name}: the time repeats {int(same.sum())} times, {first(same)}: remove the duplicate rows")
     if back.any():
         out.append(f"{name}: the clock runs back {int(back.sum())} times, by up to {-steps.min():.6g} s, {first(back)}: cut the recording there")
     ahead = steps[steps > 0.0]
@@ -44,7 +44,7 @@ def remarks(t: Any, name: str) -> list[str]:
     return out
 
 
-def told(t: Any, name: str) -> None:
+def warn(t: Any, name: str) -> None:
     """Warns of what is wrong with the times."""
     import warnings
 

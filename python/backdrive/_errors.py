@@ -9,7 +9,7 @@ _NAME = re.compile(r"\.(toml|csv|mcap|xml|urdf|mjcf|json)$|^recording-\d+$", re.
 
 
 class Error(Exception):
-    """Something could not be done. `str()` of it says what was wrong, where, and what to do.
+    """Something could not be done. `str()` of it states what was wrong, where, and what to do.
 
     `file`, `line` and `key` are where, `None` where that is not known; `code` is the exit code that the command line would end with.
     """

@@ -56,7 +56,7 @@ class Model:
 
     @property
     def name(self) -> str:
-        """The model's name, as its file says it."""
+        """The model's name, from its file."""
         return str(self.data.get("name", ""))
 
     def __getitem__(self, path: str) -> float | list[float]:
@@ -167,7 +167,7 @@ class Model:
 
     @classmethod
     def from_mujoco(cls, source: Any, *, name: str | None = None, gravity_compensated: bool = False, actuators: bool = False) -> Model:
-        """A model of the arm in an MJCF: a path, its text, an `MjSpec` or an `MjModel`. What of it has no place here is told by `describe()["remarks"]`.
+        """A model of the arm in an MJCF: a path, its text, an `MjSpec` or an `MjModel`. What it cannot hold is listed by `describe()["remarks"]`.
 
         `actuators`: take its motors as inputs; `gravity_compensated`: the motors hold the weight of the links.
         """

@@ -97,7 +97,7 @@ def load_lerobot(
         even = even - even[0] + stamps[0] if len(even) else even
         close = numpy.allclose(stamps, even, rtol=4.0 * float(numpy.finfo(numpy.float32).eps), atol=1e-6)
         frame = {"t": even if close else stamps}
-        _clock.told(frame["t"], name)
+        _clock.warn(frame["t"], name)
         for role, feature in there.items():
             for place, joint in enumerate(names[role]):
                 scale = _scale(contract, role, joint)
@@ -132,9 +132,9 @@ def _joints(feature: Mapping[str, Any], name: str) -> list[str]:
     if not isinstance(names, list):
         names = [f"joint{number}" for number in range(1, int(feature["shape"][0]) + 1)]
     if len(names) != int(feature["shape"][0]):
-        raise InputError(f"meta/info.json: features.{name}.names: has {len(names)} names, the shape says {feature['shape'][0]}")
+        raise InputError(f"meta/info.json: features.{name}.names: has {len(names)} names, the shape has {feature['shape'][0]}")
     joints = [str(n).rsplit(".", 1)[0] for n in names]
-    # Where nothing but the end tells joints apart it is no name of a quantity: arm.1, arm.2.
+    # Where only the end separates joints, it is not the name of a quantity: arm.1, arm.2.
     return joints if len(set(joints)) == len(joints) else [str(n) for n in names]
 
 
@@ -268,7 +268,7 @@ def load_rosbag(path: str | os.PathLike[str], *, topics: str | Iterable[str] | N
     for topic, of in rows.items():
         # Differences of whole ns: seconds since 1970 would leave only 0.2 us of a double.
         frame = {"t": numpy.array([t - begin for t in times[topic]], dtype=float) / 1e9}
-        _clock.told(frame["t"], topic)
+        _clock.warn(frame["t"], topic)
         headings = list(dict.fromkeys(name for _, _, numbers in of for name in numbers))
         frame.update({name: numpy.array([numbers.get(name, numpy.nan) for _, _, numbers in of]) for name in headings})
         out[topic] = of_kind(frame, kind)
@@ -276,7 +276,7 @@ def load_rosbag(path: str | os.PathLike[str], *, topics: str | Iterable[str] | N
 
 
 def save(frame: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Writes a recording as .csv, .parquet, .mat or .mcap, as the path's ending says; what is read back is the same to the last bit."""
+    """Writes a recording as .csv, .parquet, .mat or .mcap, by the ending of the path; what is read back is the same to the last bit."""
     import numpy
 
     from ._frames import columns_of, write
@@ -330,7 +330,7 @@ def _timed(frame: dict[str, Any], time: str, path: Any, kind: str) -> Any:
     """With its times first, called t."""
     if time not in frame:
         raise InputError(f"{os.fspath(path)}: {time}: there is no such column of numbers; there are {', '.join(frame)}: name the times with time=...")
-    _clock.told(frame[time], os.path.basename(os.fspath(path)))
+    _clock.warn(frame[time], os.path.basename(os.fspath(path)))
     return of_kind({"t": frame[time], **{name: values for name, values in frame.items() if name != time}}, kind)
 
 

@@ -54,10 +54,10 @@ class Result:
 class Report(Result):
     """A result with a page: `html` is the whole of it, `text` what the command line prints, `figures` the data that the page draws."""
 
-    def __init__(self, text: str, notes: list[str], code: int, html: str | None, said: str) -> None:
+    def __init__(self, text: str, notes: list[str], code: int, html: str | None, printed: str) -> None:
         super().__init__(text, notes, code)
         self.html: str | None = html
-        self.text: str = said
+        self.text: str = printed
 
     def __str__(self) -> str:
         return self.text
@@ -88,7 +88,7 @@ class Report(Result):
 
 
 class Verdict(Report):
-    """What a diagnosis says; its fields are those of the verdict file (docs/verdict.schema.json).
+    """The result of a diagnosis; its fields are those of the verdict file (docs/verdict.schema.json).
 
     `verdict` is one word: missing, parameters, nothing_missing, unexplained, ambiguous, cannot_tell. `findings` are the physics that the model leaves out,
     most important first, each with `physics`, its place, `parameters` (value, ci95, unit) and `confidence`. `held_out` has the errors before and after on
@@ -106,8 +106,8 @@ class Verdict(Report):
     detectable: list[Fields] | None
     arm: Fields | None
 
-    def __init__(self, files: dict[str, str], notes: list[str], code: int, said: str, html: str | None, folder: str | None) -> None:
-        super().__init__(files["verdict.json"], notes, code, html, said)
+    def __init__(self, files: dict[str, str], notes: list[str], code: int, printed: str, html: str | None, folder: str | None) -> None:
+        super().__init__(files["verdict.json"], notes, code, html, printed)
         self.model: Model = Model(files["model.diagnosed.toml"], name="model.diagnosed.toml", folder=folder)
         rivals = sorted(name for name in files if "rival" in name and name.endswith(".toml"))
         self.rivals: list[Model] = [Model(files[name], name=name, folder=folder) for name in rivals]

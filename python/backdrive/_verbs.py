@@ -94,13 +94,13 @@ def diagnose(
 
     recordings: one or several: paths, frames, dictionaries of arrays, or a dictionary of these by name. Columns in SI units, `t` in s.
     model: the nominal model; without it the set's own.
-    held_out: recordings that no fit may see; without it, of several recordings, the last one.
+    held_out: recordings that no fit uses; without this, the last one of several recordings.
     grip: the grip that holds the model, where a hand held the device.
     columns: which column is which signal: `{"position": {"column": "pos", "unit": "deg"}, "t": "time"}`.
     joints: of an arm, the columns of each joint: `{"elbow": {"position": "q2", "torque": "tau2"}}`, rad and N m.
     initial: "rest" (the device starts at rest) or "free" (it does not).
-    ignore: recorded inputs that may have no place in the model. without: physics that are not to be considered.
-    effects: how many physics may be missing at once. effort: how much to search, 1 is usual. patience: a limit on the clock, s.
+    ignore: recorded inputs that the model need not have. without: effects to exclude.
+    effects: the largest number of missing effects. effort: how much to search; 1 is the default. patience: a time limit, s.
     settings: further keys of `set.toml`. out: a folder for verdict, model and report. report: whether to make the page.
     progress: whether to show it; or a function of message, position and length.
 
@@ -124,13 +124,13 @@ def diagnose(
             out=out,
             report=report,
         )
-        files = {name: work.said(text) for name, text in answer.files}
-        html = None if answer.html is None else work.said(answer.html)
+        files = {name: work.without_folder(text) for name, text in answer.files}
+        html = None if answer.html is None else work.without_folder(answer.html)
         if answer.raised is None:
-            return Verdict(files, work.notes, work.code, work.said(answer.text), html, _folder_of(model))
+            return Verdict(files, work.notes, work.code, work.without_folder(answer.text), html, _folder_of(model))
         if not isinstance(answer.raised, KeyboardInterrupt):
             raise answer.raised
-        found = Verdict(files, answer.notes, INTERRUPTED, work.said(answer.text), html, _folder_of(model)) if files else None
+        found = Verdict(files, answer.notes, INTERRUPTED, work.without_folder(answer.text), html, _folder_of(model)) if files else None
         raise Interrupted(found) from answer.raised
 
 
@@ -148,7 +148,7 @@ def fit(
     settings: Mapping[str, Any] | None = None,
     progress: Progress = True,
 ) -> Fit:
-    """Refits a model's numbers to recordings, its structure as it is; arguments as those of `diagnose`. Models of one axis only."""
+    """Refits a model's parameters to recordings, its structure unchanged; arguments as those of `diagnose`. Models of one axis only."""
     with Work(progress) as work:
         answer = work.answer(
             _backdrive.fit,
@@ -160,7 +160,7 @@ def fit(
             seconds=patience,
         )
         fitted = Model(dict(answer.files)["fitted.toml"], name="fitted.toml", folder=_folder_of(model))
-        return Fit(work.said(answer.json), work.notes, work.code, fitted)
+        return Fit(work.without_folder(answer.json), work.notes, work.code, fitted)
 
 
 def simulate(
@@ -197,7 +197,7 @@ def simulate(
             noise=noise,
             columns=set_file,
         )
-        text = work.said(answer.json)
+        text = work.without_folder(answer.json)
         tables = dict(answer.tables)
         frames = {run["recording"]: _frames.of_bytes(tables[run["out"]], kind) for run in fields(text)["runs"]}
         return Prediction(text, work.notes, work.code, frames)
@@ -298,8 +298,8 @@ def _roles(work: Work, roles: Any) -> str | None:
 
 
 def _report(work: Work, answer: Any) -> Report:
-    text = work.said(answer.json)
-    html = None if answer.html is None else work.said(answer.html)
+    text = work.without_folder(answer.json)
+    html = None if answer.html is None else work.without_folder(answer.html)
     return Report(text + "\n", work.notes, work.code, html, text)
 
 
@@ -348,7 +348,7 @@ def export(
 
 
 def described(model: Model, grip: Any, amplitude: float | None) -> Any:
-    """What `backdrive model show` says of a model."""
+    """What `backdrive model show` prints about a model."""
     with Work(False) as work:
         text = work.run(["model", "show", _model_file(work, model), "--json", *_options({"grip": _grip(work, grip), "amplitude": amplitude})])
         return fields(text)

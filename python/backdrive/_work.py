@@ -78,8 +78,8 @@ class Work:
     def path(self, name: str) -> str:
         return os.path.join(self.folder, name)
 
-    def said(self, text: str) -> str:
-        """Without the folder that nobody knows of."""
+    def without_folder(self, text: str) -> str:
+        """A text without the path of the temporary folder."""
         return text.replace(self.folder + os.sep, "").replace(self.folder, "the recordings")
 
     def from_here(self, path: str) -> str:
@@ -96,7 +96,7 @@ class Work:
         """Calls the verb; what it prints."""
         code, result, notes, error = self._watched(lambda progress: _backdrive.run(list(arguments), progress))
         self._ended(code, notes, error)
-        return self.said(result)
+        return self.without_folder(result)
 
     def asked(self, verb: Callable[..., Any], *given: Any, **options: Any) -> Any:
         """Calls a function behind a verb; its answer. What was raised while it worked is in there."""
@@ -121,10 +121,10 @@ class Work:
                 bar.close()
 
     def _ended(self, code: int, notes: Sequence[str], error: str | None) -> None:
-        self.notes += [self.said(note).removeprefix("note: ") for note in notes]
+        self.notes += [self.without_folder(note).removeprefix("note: ") for note in notes]
         self.code = code
         if error is not None and code != INTERRUPTED:
-            raise raised(self.said(error), code)
+            raise raised(self.without_folder(error), code)
 
     def file(self, given: Any, name: str) -> str:
         """One recording as a path."""
@@ -153,13 +153,13 @@ class Work:
         raise UsageError(f"{type(given).__name__} is no recording: expected a path, a frame, a dictionary of arrays, or several of these", 2)
 
     def set(self, recordings: Any, held_out: Any, settings: Mapping[str, Any]) -> list[str]:
-        """Recordings as arguments of a verb: paths as they are where nothing else is said of them, else a set that says it."""
+        """Recordings as arguments of a verb: paths unchanged where nothing else is stated, else a set that states it."""
         settings = {k: v for k, v in settings.items() if v}
         fit = self.files(recordings, "recording")
         if held_out is None and not settings and not any(os.path.dirname(f) == self.folder for f in fit):
             return fit
         if len(fit) == 1 and (os.path.isdir(fit[0]) or fit[0].endswith(".toml")):
-            raise UsageError(f"{fit[0]}: a set says itself what is held out and how its columns are called; write it there, or give its files", 2)
+            raise UsageError(f"{fit[0]}: a set states what is held out and how its columns are named; write it there, or give its files", 2)
         held = self.files(held_out, "held-out")
         if held_out is None and len(fit) > 1:
             held = [fit.pop()]
