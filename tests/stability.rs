@@ -127,7 +127,7 @@ fn a_swapped_part_and_a_named_script() {
     let over = ["--gain", "3", "--grip", &firm, "--canceller", &model, "--canceller-grip", &grip];
     let (code, over) = ask(&place, "run.mcap", &over);
     assert_eq!(code, Some(1), "{over}");
-    assert!(texts(&over, "warnings").contains("firmer"), "{}", over["warnings"]);
+    assert!(texts(&over, "warnings").contains("stiffer"), "{}", over["warnings"]);
     let soft = file("plant/environments/soft-tissue.toml");
     let (_, tissue) = ask(&place, "run.mcap", &["--gain", "0.3", "--environment", &soft]);
     assert!(number(&tissue, "/critical_gain") > 2.0 * number(&plain, "/critical_gain"), "{tissue}");
@@ -262,7 +262,7 @@ fn the_report_is_one_file_and_a_sweep_has_every_gain() {
     assert!(!page.replace("http://www.w3.org/", "").contains("http"), "nothing is fetched");
     assert!(!page.contains("mu*lambda"), "one spelling of the gain");
     let text = place.backdrive(&["stability", "run.mcap", "--gain", "0.3", "--grips", "1"]);
-    for part in ["verdict  STABLE", "edge", "margins", "energy"] {
+    for part in ["verdict  STABLE", "limit", "margins", "energy"] {
         assert!(text.stdout.contains(part), "{part}: {}", text.stdout);
     }
 }

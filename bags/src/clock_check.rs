@@ -138,7 +138,7 @@ mod tests {
         let mut times = even(1000);
         (times[300], times[700]) = (times[299], times[600]);
         let remarks = clock_remarks(&times);
-        assert!(remarks[0].contains("stands still once, first between rows 300 and 301"), "{remarks:?}");
+        assert!(remarks[0].contains("stops once, first between rows 300 and 301"), "{remarks:?}");
         assert!(remarks[1].contains("goes back once, by up to 0.099000 s, first between rows 700 and 701"), "{remarks:?}");
         assert!(remarks[2].contains("jumps 2 times"), "{remarks:?}");
         assert_eq!(clock_remarks(&[0.0, 0.0]).len(), 1);

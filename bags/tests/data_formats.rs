@@ -139,7 +139,7 @@ fn odd_columns_of_parquet_are_told() {
     assert!(error.to_string().contains("late.parquet: row 1: column \"late\": expected a number, found none"), "{error}");
     let asked = ImportOptions { time: "words".to_owned(), ..ImportOptions::default() };
     let error = import_table(&written.path("stamps.parquet"), &written.path("no.mcap"), &asked).expect_err("no time").to_string();
-    assert!(error.contains("column \"words\" holds text"), "{error}");
+    assert!(error.contains("column \"words\" contains text"), "{error}");
     let asked = ImportOptions { time: "when".to_owned(), ..ImportOptions::default() };
     let error = import_table(&written.path("stamps.parquet"), &written.path("no.mcap"), &asked).expect_err("no time").to_string();
     assert!(

@@ -208,7 +208,7 @@ fn a_bad_table_is_told_with_its_line() {
         ("t,x\n0,1\nzero,2\n", "line 3: column \"t\": \"zero\""),
         ("x,y\n0,1\n", "there is no column \"t\"; there is x, y"),
         ("t,x\n0,1\n1,2,3\n", "line 3"),
-        ("t,x\n1e300,1\n", "no time"),
+        ("t,x\n1e300,1\n", "is not a time in s"),
         // Comments, empty lines and carriage returns count.
         ("# by hand\n\nt,x\n0,1\n# a pause\n0.2,2\n0.1,3\n", "line 7: time goes back"),
         ("t,x\r\n0,1\r\n0.2,2\r\n0.1,3\r\n", "line 4: time goes back"),
@@ -228,7 +228,7 @@ fn a_bad_table_is_told_with_its_line() {
             "t,x\n0,1\n1000000,2\n2000000,3\n",
             "usually 1000000.0 s apart, which is implausible: state their unit, in the heading or as --time \"t [ns]\"",
         ),
-        ("t,x\n3e9,1\n", "no time"),
+        ("t,x\n3e9,1\n", "is not a time in s"),
     ] {
         write(&table, text);
         let error = import_csv(&table, &bag, &ImportOptions::default()).expect_err(text).to_string();

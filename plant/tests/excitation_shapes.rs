@@ -148,7 +148,7 @@ fn wrong_excitations_say_what_is_wrong() {
     assert_eq!(wrong("swep:amplitude=2"), "excitation \"swep:amplitude=2\": kind: unknown value \"swep\"; did you mean \"sweep\"?");
     assert_eq!(wrong("sweep"), "excitation \"sweep\": missing key \"amplitude\"");
     assert_eq!(wrong("sweep:amplitude"), "excitation \"sweep:amplitude\": expected key=value, found \"amplitude\"");
-    assert_eq!(wrong("sweep:a b=1"), "excitation \"sweep:a b=1\": \"a b\" is no key");
+    assert_eq!(wrong("sweep:a b=1"), "excitation \"sweep:a b=1\": \"a b\" is not a key");
     assert_eq!(
         wrong("sweep:amplitude=1,amplitude=2"),
         "excitation \"sweep:amplitude=1,amplitude=2\": is not valid TOML at column 1: duplicate key"

@@ -164,7 +164,7 @@ fn wrong_recordings_are_refused_at_their_line() {
     assert_eq!(with(&rule(Source::Column("xx".into()))), "x.csv:1: [columns] y: unknown column \"xx\"; did you mean \"x\"?");
     assert_eq!(
         with(&rule(Source::Topic { topic: "/a".into(), field: "b".into() })),
-        "x.csv:1: [columns] takes \"y\" from the topic /a, and a CSV file has columns"
+        "x.csv:1: [columns] reads \"y\" from the topic /a, but a CSV file has columns"
     );
     assert_eq!(message(read_csv(Path::new("none.csv"), None, &none, &Piece::default())), "none.csv: there is no such file");
 }

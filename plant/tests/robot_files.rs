@@ -223,7 +223,7 @@ fn an_mjcf_is_refused_in_a_sentence_with_its_line() {
     refused(&mujoco_with("damping=\"0.01\"", "damping=\"-0.01\""), "damping: must be at least 0");
     refused(&mujoco_with("name=\"m2\" joint=\"elbow\"", "name=\"m2\" joint=\"elbw\""), "unknown joint \"elbw\"; did you mean \"elbow\"?");
     refused(&mujoco_with("range=\"-90 90\"", "range=\"90 -90\""), "expected the lower limit first");
-    refused(&mujoco_with("name=\"fore\" pos", "name=\"fore\" euler=\"0 0 1\" quat=\"1 0 0 0\" pos"), "says both quat and euler");
+    refused(&mujoco_with("name=\"fore\" pos", "name=\"fore\" euler=\"0 0 1\" quat=\"1 0 0 0\" pos"), "has both quat and euler");
     refused("<mujoco><worldbody><body/></worldbody></mujoco>", "has no joint that moves");
     refused("<mujoco><worldbody><joint/></worldbody></mujoco>", "is in <worldbody>, which does not move");
     refused(

@@ -183,7 +183,7 @@ mod tests {
             shows: Some(Where { time: vec![[1.0, 1.2]], band_hz: [20.0, 90.0], state: None, class: None }),
             looks_like: Some("backlash between motor and drum".to_string()),
         };
-        let said = "31 % of the residual with the parameters refitted (the sensors' noise would be 6 %); 20.0 Hz to 90.0 Hz; most at 1.00 to 1.20 s; \
+        let said = "31 % of the residual with the parameters refitted (sensor noise: 6 %); 20.0 Hz to 90.0 Hz; most at 1.00 to 1.20 s; \
                     looks most like backlash between motor and drum";
         assert_eq!(remains(&left).as_deref(), Some(said));
     }

@@ -165,7 +165,7 @@ mod tests {
         let full = problem(MODEL, 300_000, 0.001, 1e-4);
         let (thin, remark) = thinned(full.clone());
         let text = remark.unwrap().text;
-        assert!(text.contains("one in ") && samples_of(&thin.fit) <= tuning().recordings.most_samples + 1, "{text}");
+        assert!(text.contains("th sample is used") && samples_of(&thin.fit) <= tuning().recordings.most_samples + 1, "{text}");
         let every = full.fit[0].len.div_ceil(thin.fit[0].len);
         assert!(every > 1 && (thin.fit[0].period - every as f64 * full.fit[0].period).abs() < 1e-12);
         // Both predictions agree at the samples that both have.
