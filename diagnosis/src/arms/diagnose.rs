@@ -6,14 +6,12 @@ use crate::arms::coupled::coupled_by_many;
 use crate::arms::drawn::{Drawn, drawn};
 use crate::arms::error::ArmError;
 use crate::arms::excitation::RATE;
-use crate::arms::experiment::{Plan, REPEATS, plan, same_load};
+use crate::arms::experiment::{Plan, REPEATS, plan};
 use crate::arms::fit::Fit;
 use crate::arms::judge::{AGAINST, Judged, each, gains, judge};
-use crate::arms::offers::load_spread;
-use crate::arms::physics::{At, Physics};
 use crate::arms::problem::Problem;
 use crate::arms::regression::Data;
-use crate::arms::search::{LOAD_CHANGES, MOST, Search, added, rare, search};
+use crate::arms::search::{MOST, Search, added, rare, search};
 use crate::arms::verdict::{Parts, place, verdict};
 use crate::arms::written::{Reading, model_of};
 use crate::audit::Weight;
@@ -190,10 +188,7 @@ fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
             .to_string(),
         weight: Weight::Caution,
     };
-    let untold = same_load(data, found);
-    let rubs = |j: usize| found.best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
-    let unchanged = |j: &usize| untold.contains(j) || rubs(*j) && !data.unsigned[*j] && load_spread(data, *j) < LOAD_CHANGES;
-    (0..data.problem.joints.len()).filter(unchanged).map(remark).collect()
+    (0..data.problem.joints.len()).filter(|j| found.under_one_load.contains(j)).map(remark).collect()
 }
 
 fn next(plan: &Plan, problem: &Problem) -> NextExperiment {

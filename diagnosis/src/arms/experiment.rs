@@ -11,6 +11,7 @@ use crate::arms::excitation::{Excitation, draw};
 use crate::arms::fit::{Structure, Weights};
 use crate::arms::gram::Gram;
 use crate::arms::log::Log;
+use crate::arms::one_load::{ENOUGH, Exchanged, exchanged};
 use crate::arms::physics::{At, Physics, Term, several_payloads};
 use crate::arms::problem::Problem;
 use crate::arms::regression::Data;
@@ -26,8 +27,6 @@ const CLOSELY: usize = 12;
 const RATE: f64 = 50.0;
 /// Times that the motion is to be recorded; one of them is held out.
 pub const REPEATS: u32 = 3;
-/// Separation that is enough, standard deviations: the claim that a search makes takes about as much.
-const ENOUGH: f64 = 4.0;
 /// How many times as far a payload has to bring explanations apart to be worth fastening it.
 const WORTH: f64 = 1.5;
 /// The payload that is asked for, as a share of the last body's mass.
@@ -65,25 +64,12 @@ pub struct Plan {
 fn of_load(data: &Data, search: &Search) -> Vec<(usize, Question)> {
     let best = &search.best;
     let of_joint = |j: usize| {
-        let at = |physics| best.structure.terms.iter().position(|t| t.physics == physics && t.at == At::Joint(j));
-        let (index, other) = match (at(Physics::Coulomb), at(Physics::LoadFriction)) {
-            (Some(index), None) => (index, Physics::LoadFriction),
-            (None, Some(index)) => (index, Physics::Coulomb),
-            _ => return None,
-        };
-        let mut rival = best.structure.clone();
-        rival.terms[index] = Term::new(other, At::Joint(j), Vec::new());
+        let Exchanged { index, rival } = exchanged(data, best, &search.weights, j)?;
         let between = [named(data, &best.structure.terms[index]), named(data, &rival.terms[index])];
         let terms = vec![(best.structure.terms[index].clone(), best.values[best.places[index].clone()].to_vec())];
-        let told = data.gram(&rival, &terms, &search.weights, 1.0)?.left().sqrt();
-        (told < ENOUGH).then_some((j, Question { terms, rival, between }))
+        Some((j, Question { terms, rival, between }))
     };
     (0..data.problem.joints.len()).filter_map(of_joint).collect()
-}
-
-/// Joints at which the logs do not distinguish load-dependent friction from friction of one level.
-pub fn same_load(data: &Data, search: &Search) -> Vec<usize> {
-    of_load(data, search).into_iter().map(|(joint, _)| joint).collect()
 }
 
 fn named(data: &Data, term: &Term) -> String {

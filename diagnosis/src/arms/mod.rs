@@ -25,6 +25,7 @@ pub mod layout;
 pub mod log;
 pub mod motion;
 mod offers;
+mod one_load;
 mod passive;
 pub mod physics;
 pub mod problem;

@@ -4,6 +4,7 @@ use crate::arms::consistent::consistent;
 use crate::arms::error::ArmError;
 use crate::arms::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::arms::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
+use crate::arms::one_load::under_one_load;
 use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
@@ -28,7 +29,7 @@ pub const LEAST_SHARE: f64 = 0.03;
 pub const LEAST_TORQUE: f64 = 0.01;
 
 /// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
-pub const LOAD_CHANGES: f64 = 0.5;
+const LOAD_CHANGES: f64 = 0.5;
 
 /// A candidate that was fitted in full.
 #[derive(Debug, Clone)]
@@ -62,6 +63,9 @@ pub struct Search {
     /// For each added term that inertial parameters could compensate: the score, above the best one's, of the structure without it and with its bodies as free
     /// as is worth it.
     pub freed: Vec<Option<f64>>,
+    /// Joints at which one of the structures that a search ended with does not distinguish load-dependent friction from friction of one level, or whose load
+    /// hardly changes with its bodies.
+    pub under_one_load: Vec<usize>,
 }
 
 /// Another structure, with a term instead of one that was found.
@@ -107,10 +111,11 @@ fn searched_again(data: &mut Data, without: &[String], most: usize, limit: Limit
         return Ok(found);
     }
     data.see(&data.problem.bodies.nominal)?;
-    let again = search_within(data, without, most, limit, Start::WithFriction)?;
+    let mut again = search_within(data, without, most, limit, Start::WithFriction)?;
     let (mine, other) = (rare(&found.best.structure), rare(&again.best.structure));
     let is_surely_better = |a: &Fit, b: &Fit| compare(data, a, b, &found.weights).is_some_and(|g| g.is_sure());
     if is_surely_better(&found.best, &again.best) || other < mine && !is_surely_better(&again.best, &found.best) {
+        again.under_one_load.extend(&found.under_one_load);
         return Ok(again);
     }
     data.see(&data.parameters(&found.best))?;
@@ -155,7 +160,11 @@ fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit,
         added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
     let rivals = added.iter().map(|i| rivals(data, &pool, &best, *i, &weights)).collect();
     let freed = added.iter().map(|i| freed(data, &best, *i, &weights)).collect();
-    Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed })
+    let mut under_one_load = under_one_load(data, &best, &weights);
+    let rubs = |j: usize| best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
+    under_one_load
+        .extend((0..data.problem.joints.len()).filter(|j| rubs(*j) && !data.unsigned[*j] && load_spread(data, *j) < LOAD_CHANGES));
+    Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed, under_one_load })
 }
 
 /// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor or a gear that is not there. (Without a motor the
