@@ -240,7 +240,7 @@ class Readers(unittest.TestCase):
         even = numpy.arange(1000) / 100.0
         self.assertEqual(remarks(even, "a"), [])
         for change, said in (
-            (lambda t: numpy.insert(t, 400, t[400]), "stands still 1 times, first after sample 400, at 4 s"),
+            (lambda t: numpy.insert(t, 400, t[400]), "repeats 1 times, first after sample 400, at 4 s"),
             (lambda t: numpy.concatenate([t[:500], t[:500]]), "runs back 1 times, by up to 4.99 s"),
             (lambda t: numpy.delete(t, slice(300, 320)), "jumps 1 times, by up to 0.21 s where 0.01 s are usual, first after sample 299, at 2.99 s: about 20"),
             (lambda t: t + 0.0007 * numpy.random.default_rng(1).standard_normal(len(t)), "uneven"),
