@@ -64,13 +64,13 @@ impl Opened {
 /// When a file is missing or wrong, the recordings do not suit the model, or an option cannot be taken into account for this device.
 pub fn open(asked: &Asked) -> Result<Opened, AnswerError> {
     refuse_wrong(asked)?;
-    let (set, told) = open::set_of(&asked.set).map_err(AnswerError::input)?;
+    let (set, is_stated) = open::set_of(&asked.set).map_err(AnswerError::input)?;
     let model = asked.model.clone().or_else(|| set.model.clone());
     if is_servo(&set) {
-        return servo(asked, set, told, model);
+        return servo(asked, set, is_stated, model);
     }
     match model {
-        Some(model) if Model::load(&model).map_err(AnswerError::input)?.arm.is_some() => arm(asked, set, told, model),
+        Some(model) if Model::load(&model).map_err(AnswerError::input)?.arm.is_some() => arm(asked, set, is_stated, model),
         _ => one_axis(asked),
     }
 }
@@ -82,17 +82,17 @@ fn one_axis(asked: &Asked) -> Result<Opened, AnswerError> {
     Ok(Opened { device: Device::OneAxis(Box::new(problem)), options: asked.options.clone(), name, notes, files })
 }
 
-fn arm(asked: &Asked, mut set: RecordingSet, told: bool, model: PathBuf) -> Result<Opened, AnswerError> {
+fn arm(asked: &Asked, mut set: RecordingSet, is_stated: bool, model: PathBuf) -> Result<Opened, AnswerError> {
     let mut notes = Vec::new();
-    open::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, is_stated, &mut notes);
     notes.extend(of_arm(asked, &set)?);
     let problem = ArmProblem::open(&set, Some(&model)).map_err(AnswerError::input)?;
     Ok(opened(asked, Device::Arm(Box::new(problem)), &set, Some(&model), notes))
 }
 
-fn servo(asked: &Asked, mut set: RecordingSet, told: bool, model: Option<PathBuf>) -> Result<Opened, AnswerError> {
+fn servo(asked: &Asked, mut set: RecordingSet, is_stated: bool, model: Option<PathBuf>) -> Result<Opened, AnswerError> {
     let mut notes = checks::repeated(&set).map_err(AnswerError::input)?;
-    open::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, is_stated, &mut notes);
     notes.extend(of_servo(asked)?);
     let problem = ServoProblem::open(&set, model.as_deref()).map_err(AnswerError::input)?;
     Ok(opened(asked, Device::Servo(Box::new(problem)), &set, model.as_deref(), notes))

@@ -53,10 +53,10 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
         }
     }
     line("scale", servo.scale.clone());
-    let mut told: Vec<&str> = Vec::new();
+    let mut listed: Vec<&str> = Vec::new();
     for shared in servo.joints.iter().flat_map(|j| &j.shared) {
-        if !told.contains(&shared.sentence.as_str()) {
-            told.push(&shared.sentence);
+        if !listed.contains(&shared.sentence.as_str()) {
+            listed.push(&shared.sentence);
             let joints: Vec<&str> =
                 servo.joints.iter().filter(|j| j.shared.iter().any(|s| s.sentence == shared.sentence)).map(|j| j.joint.as_str()).collect();
             line("open", format!("{}: {}; to separate them, {}", joints.join(", "), shared.sentence, shared.separated_by));
