@@ -35,6 +35,7 @@ pub mod rigid;
 pub mod search;
 pub mod sentences;
 pub mod soft;
+mod starts;
 pub mod stated;
 pub mod system;
 pub mod usable;

@@ -8,6 +8,7 @@ use crate::arms::one_load::under_one_load;
 use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
+use crate::arms::starts::{COMMON, Start, begun, common};
 use crate::belief::predictive::{Gain, gain};
 use crate::output_error::work::Limit;
 
@@ -88,7 +89,7 @@ pub struct Rival {
 /// # Errors
 /// Where a fit cannot be computed at all.
 pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
-    let found = searched_again(data, without, most, limit)?;
+    let found = beside_least_squares(data, without, most, limit)?;
     if !(0..data.problem.joints.len()).any(|j| data.is_passive(j)) || found.best.structure.tolerance == 0 {
         return Ok(found);
     }
@@ -100,7 +101,39 @@ pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) ->
     }
     data.most_tolerance = 0;
     data.see(&data.problem.bodies.nominal)?;
-    searched_again(data, without, most, limit)
+    beside_least_squares(data, without, most, limit)
+}
+
+/// Searches; where plain least squares then predicts a joint surely better, once more from there, with everything that is common from the start. The second
+/// is kept where that is so at fewer joints, and it predicts no worse over all.
+fn beside_least_squares(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
+    let found = searched_again(data, without, most, limit)?;
+    let behind = behind_least_squares(data, without, &found);
+    if behind.is_empty() || limit.is_over() {
+        return Ok(found);
+    }
+    data.see(&data.problem.bodies.nominal)?;
+    let again = search_within(data, without, most, limit, Start::Common)?;
+    let is_worse = compare(data, &again.best, &found.best, &found.weights).is_some_and(|g| g.is_sure());
+    if !is_worse && behind_least_squares(data, without, &again).len() < behind.len() {
+        return Ok(again);
+    }
+    data.see(&data.parameters(&found.best))?;
+    Ok(found)
+}
+
+/// Joints at which plain least squares predicts stretches that no fit has seen surely better than what was found: all inertial parameters free, and friction,
+/// armature and a constant at every joint.
+fn behind_least_squares(data: &Data, without: &[String], found: &Search) -> Vec<usize> {
+    let pool = pool(data, without);
+    let Some(plain) = data.fit(&common(data, &pool, &data.nominal_structure()), &found.weights) else { return Vec::new() };
+    let of = |fit: &Fit, joint: usize| by_block_of(data, &fit.unseen, &found.weights, false, &[joint]);
+    let is_behind = |joint: &usize| {
+        let square = |fit: &Fit| data.mean_square(&fit.unseen, *joint, false);
+        square(&plain) < (1.0 - LEAST_SHARE) * square(&found.best)
+            && gain(&of(&found.best, *joint), &of(&plain, *joint)).is_some_and(|g| g.is_sure())
+    };
+    (0..data.problem.joints.len()).filter(|joint| !data.unsigned[*joint] && !data.is_passive(*joint)).filter(is_behind).collect()
 }
 
 /// Searches; where that ends with many rare effects, once more with friction and armature at every joint from the start. Rare effects take the place of common
@@ -124,14 +157,11 @@ fn searched_again(data: &mut Data, without: &[String], most: usize, limit: Limit
 
 fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit, from: Start) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
-    let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
-        .into_iter()
-        .filter(|t| !without.iter().any(|w| w == t.physics.facts().name) && may_be(data, t))
-        .collect();
+    let pool = pool(data, without);
     let nominal = data.nominal_structure();
     let mut weights = first_weights(data, &nominal).ok_or_else(failed)?;
     let mut tried = Vec::new();
-    let first = if from == Start::WithFriction { with_friction(data, &pool, &nominal) } else { nominal.clone() };
+    let first = begun(data, &pool, &nominal, from);
     let mut best = data.fit(&first, &weights).ok_or_else(failed)?;
     // Twice: what was found is the better view of what the joints pass on, and of how much their residuals scatter.
     for round in 0..2 {
@@ -167,6 +197,12 @@ fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit,
     Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed, under_one_load })
 }
 
+/// Everything that a search may add.
+fn pool(data: &Data, without: &[String]) -> Vec<Term> {
+    let is_wanted = |t: &Term| !without.iter().any(|w| w == t.physics.facts().name) && may_be(data, t);
+    candidates(data.problem, &data.motions[..data.fit_count]).into_iter().filter(is_wanted).collect()
+}
+
 /// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor or a gear that is not there. (Without a motor the
 /// load at a joint is its friction: friction in proportion to the load would be in proportion to itself.)
 fn may_be(data: &Data, term: &Term) -> bool {
@@ -182,23 +218,6 @@ fn may_be(data: &Data, term: &Term) -> bool {
         At::Pair(j, k) => may(j) && may(k),
         At::Base => !data.unsigned.contains(&true),
     }
-}
-
-/// What a search begins with.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Start {
-    /// The nominal structure.
-    AsGiven,
-    /// The same with friction and armature at every joint that has a motor.
-    WithFriction,
-}
-
-/// A structure with viscous and dry friction and armature at every joint that has a motor.
-fn with_friction(data: &Data, pool: &[Term], structure: &Structure) -> Structure {
-    let every = [Physics::Damper, Physics::Coulomb, Physics::Inertia];
-    let is_driven = |t: &&Term| t.at.joint().is_some_and(|j| !data.is_passive(j));
-    let missing = pool.iter().filter(|t| every.contains(&t.physics) && !structure.terms.iter().any(|own| own.is_like(t))).filter(is_driven);
-    Structure { terms: structure.terms.iter().chain(missing).cloned().collect(), ..structure.clone() }
 }
 
 /// Terms that a search has added, by index.
@@ -230,10 +249,17 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
 
 /// Mean squared held-out residuals by block, weighted over the joints, in lists of neighbours.
 pub fn by_block(data: &Data, residual: &[f64], weights: &Weights, held_out: bool) -> Vec<Vec<f64>> {
+    let joints: Vec<usize> = (0..data.problem.joints.len()).collect();
+    by_block_of(data, residual, weights, held_out, &joints)
+}
+
+/// The same of some joints.
+fn by_block_of(data: &Data, residual: &[f64], weights: &Weights, held_out: bool, joints: &[usize]) -> Vec<Vec<f64>> {
     let motions = if held_out { data.fit_count..data.motions.len() } else { 0..data.fit_count };
     let of_block = |block: &crate::arms::layout::Block| -> f64 {
-        (0..data.problem.joints.len())
-            .map(|j| {
+        joints
+            .iter()
+            .map(|&j| {
                 let first = data.layout.of(block.motion, j).start;
                 let rows = &residual[first + block.rows.start..first + block.rows.end];
                 rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64 / weights.sd[j].powi(2)
@@ -254,9 +280,6 @@ pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
         .map(|j| 1.0 - data.mean_square(&better.unseen, j, false) / data.mean_square(&base.unseen, j, false).max(f64::MIN_POSITIVE))
         .fold(f64::NEG_INFINITY, f64::max)
 }
-
-/// Effects that every joint has more or less of: they take no other's place.
-const COMMON: [Physics; 4] = [Physics::Coulomb, Physics::Damper, Physics::Bias, Physics::Inertia];
 
 /// Terms that a search has added and that not every joint has.
 pub fn rare(structure: &Structure) -> usize {

@@ -3,7 +3,7 @@
 use crate::common::{AS_STATED, Beside, set};
 use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::judge::{AGAINST, each, gains, judge};
-use backdrive_diagnosis::arms::physics::Physics;
+use backdrive_diagnosis::arms::physics::{At, Physics};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::arms::regression::Data;
 use backdrive_diagnosis::arms::search::{Search, added, search};
@@ -53,6 +53,25 @@ fn dry_friction_is_named_at_its_joint() {
     assert!(elbow.loop_diagnosed.unwrap() < 0.5 * elbow.loop_refit.unwrap(), "{elbow:?}");
     let model = Model::from_toml(&found.model, "diagnosed").unwrap();
     assert!(model.elements.iter().any(|e| e.law.kind().name == "coulomb" && model.place_name(e.between[0]) == "elbow"));
+}
+
+#[test]
+fn a_search_that_found_less_than_least_squares_begins_once_more_with_what_is_common() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let mut data = Data::new(&problem, None, false).unwrap();
+    // Nothing may be added here, so friction can only come from the second start.
+    let found = search(&mut data, &[], 0, Limit::default()).unwrap();
+    let at: Vec<_> = added(&found.best.structure)
+        .into_iter()
+        .map(|i| (found.best.structure.terms[i].physics, found.best.structure.terms[i].at))
+        .collect();
+    assert_eq!(at, [(Physics::Coulomb, At::Joint(1))]);
+    // What is withheld does not come back that way.
+    let mut data = Data::new(&problem, None, false).unwrap();
+    let found = search(&mut data, &["coulomb".to_string()], 0, Limit::default()).unwrap();
+    assert!(found.best.structure.terms.iter().all(|t| t.given.is_some() || t.physics != Physics::Coulomb));
 }
 
 #[test]
