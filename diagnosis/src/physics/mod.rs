@@ -1,6 +1,8 @@
 //! The effects that a model may lack: one file each, which holds everything that diagnosis knows of it, and one line here.
 
 #[cfg(test)]
+mod lists;
+#[cfg(test)]
 mod tests;
 
 use crate::hypothesis::sites::{Kin, Sites};

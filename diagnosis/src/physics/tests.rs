@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const SAMPLES: usize = 400;
 
 /// Text and model of every device at hand.
-fn devices() -> Vec<(String, String, Model)> {
+pub(super) fn devices() -> Vec<(String, String, Model)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut files: Vec<PathBuf> = Vec::new();
     let in_folder = |folder: PathBuf| std::fs::read_dir(folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path()));
@@ -55,7 +55,7 @@ fn driven((inputs, period): &(Vec<Vec<f64>>, f64)) -> Run {
     Run { inputs: inputs.clone(), period: *period, begins: Vec::new() }
 }
 
-fn hypotheses(model: &Model) -> (Vec<Hypothesis>, (Vec<Vec<f64>>, f64)) {
+pub(super) fn hypotheses(model: &Model) -> (Vec<Hypothesis>, (Vec<Vec<f64>>, f64)) {
     let run = run(model);
     let scales = Scales::of(model, &[driven(&run)]).expect("the device moves");
     (all(model, &scales), run)
