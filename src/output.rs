@@ -10,6 +10,7 @@ use crate::caller;
 use crate::failure::{Failure, code};
 use crate::offered::own_command;
 use backdrive_bags::move_into_place;
+use backdrive_pages::parts::symbols;
 use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_report::Page;
 use clap::Parser;
@@ -144,6 +145,7 @@ pub fn page(path: &Path, page: Page) -> Result<(), Failure> {
 /// The text of a page, with the version that made it at its foot, and the command where there is one.
 pub fn html(mut page: Page) -> String {
     let with = own_command().map_or_else(String::new, |command| format!(" with: {command}"));
+    symbols(&mut page);
     page.text(&format!("Made by backdrive {}{with}", env!("CARGO_PKG_VERSION")));
     page.html()
 }

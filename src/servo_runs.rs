@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::model_run::Run;
 use crate::output;
 use crate::progress;
-use backdrive_answers::estimate::estimate;
+use backdrive_answers::sentences::estimate;
 use backdrive_plant::model::Model;
 use backdrive_predict::fit::Options as Fitting;
 use backdrive_predict::servos::{JointError, ServoRuns};

@@ -120,6 +120,25 @@ fn a_bag_of_arms_needs_no_other_file() {
 }
 
 #[test]
+fn an_estimated_hand_over_an_arm_takes_the_limit_without_and_is_then_never_worse() {
+    let place = Place::new();
+    let graph = place.write("arm.toml", &graph_text("launch/three-joint.toml")).display().to_string();
+    let run = |lambda: &str, with: &[&str]| {
+        let options = ["run", &graph, "--transport", "inproc", "--overwrite", "--lambda", lambda];
+        place.backdrive(&[&options, with].concat())
+    };
+    let refused = run("2", &["--hand", "estimated"]);
+    assert!(refused.code == Some(3) && refused.stderr.contains("3 coupled axes needs edge_without (--edge-without"), "{refused:?}");
+    let long = std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1");
+    for lambda in if long { &["2", "2.5", "3"][..] } else { &["3"] } {
+        for with in [&["--canceller", "none"][..], &["--hand", "estimated", "--edge-without", "3"]] {
+            let done = run(lambda, with);
+            assert!(done.code == Some(0) && done.stdout.contains("stable at mu*lambda"), "{lambda} {with:?}: {done:?}");
+        }
+    }
+}
+
+#[test]
 fn what_an_arm_cannot_be_in_a_graph_is_said_with_its_place() {
     let place = Place::new();
     let refused = |text: String, with: &[&str]| {

@@ -305,6 +305,30 @@ fn bags() {
         ],
     );
 
+    // Cut off behind its header, its graph, and all its files.
+    let first_chunk = whole.windows(4).position(|bytes| bytes == [0x04, 0x22, 0x4d, 0x18]).unwrap();
+    let model = system::file("plant/models/rigid-mass.toml");
+    for length in [100, first_chunk / 2, first_chunk] {
+        std::fs::write(place.path("begun.mcap"), &whole[..length]).unwrap();
+        for words in [
+            &["stability"][..],
+            &["why"],
+            &["replay"],
+            &["inspect"],
+            &["bag", "export", "--out", "x.csv"],
+            &["simulate", &model, "--out", "x.csv"],
+            &["diagnose", "--model", &model, "--out", "x"],
+            &["init", ".", "--yes", "--recording"],
+        ] {
+            let told = place.backdrive(&[words, &["begun.mcap"]].concat());
+            let says = "begun.mcap: the file was not closed and is cut off before its first message";
+            let says = if words[0] == "bag" { says.trim_start_matches("begun.mcap: ") } else { says };
+            assert!(told.code == Some(3) && told.stderr.contains(says), "{words:?} {length}: {told:?}");
+        }
+        let told = place.backdrive(&["bag", "info", "begun.mcap"]);
+        assert!(told.code == Some(4) && told.stdout.contains("cut off before its first message; record it again"), "{told:?}");
+    }
+
     // A bag that was cut off is still a bag.
     let told = place.backdrive(&["bag", "info", "cut.mcap"]);
     assert_eq!(told.code, Some(4), "{told:?}");

@@ -122,19 +122,9 @@ fn of_a_bag_whose_end_is_missing_it_is_said_with_the_command_that_saves_the_rest
     assert_eq!(place.backdrive(&["bag", "import", "clean.csv", "--bag", "whole.mcap"]).code, Some(0));
     let bytes = std::fs::read(place.path("whole.mcap")).unwrap();
     let says = "so its end is missing; `backdrive bag recover cut.mcap --bag cut-saved.mcap` makes a clean copy of what there is";
-    // Before the first message that is whole, and behind many.
-    let mut codes = Vec::new();
-    for length in [1000, bytes.len() * 9 / 10] {
-        std::fs::write(place.path("cut.mcap"), &bytes[..length]).unwrap();
-        let done = place.backdrive(&["inspect", "cut.mcap"]);
-        assert!(format!("{}{}", done.stdout, done.stderr).contains(says), "{length}: {done:?}");
-        codes.push(done.code);
-    }
-    assert_eq!(codes[0], Some(3), "{codes:?}");
-    std::fs::write(place.path("begun.mcap"), &bytes[..1000]).unwrap();
-    let export = place.backdrive(&["bag", "export", "begun.mcap", "--out", "e.csv"]);
-    assert!(export.code == Some(2) || export.code == Some(3), "{export:?}");
-    assert!(export.stderr.contains("bag recover begun.mcap --bag begun-saved.mcap"), "{export:?}");
+    std::fs::write(place.path("cut.mcap"), &bytes[..bytes.len() * 9 / 10]).unwrap();
+    let done = place.backdrive(&["inspect", "cut.mcap"]);
+    assert!(format!("{}{}", done.stdout, done.stderr).contains(says), "{done:?}");
     let saved = place.backdrive(&["bag", "recover", "cut.mcap", "--bag", "cut-saved.mcap"]);
     assert!(matches!(saved.code, Some(0 | 4)), "{saved:?}");
     let again = place.backdrive(&["inspect", "cut-saved.mcap"]);

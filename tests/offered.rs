@@ -218,27 +218,6 @@ fn what_is_offered_for_an_arm_works_as_it_stands() {
     assert!(offers.run(&place) >= 1, "{:?}", offers.0);
 }
 
-#[test]
-fn a_bag_that_breaks_off_before_its_first_message_is_recovered_or_recorded_again() {
-    let place = place();
-    let whole = place.backdrive(&["run", "launch/contact.toml", "--transport", "inproc", "--duration", "0.2", "--bag", "whole.mcap"]);
-    assert!(matches!(whole.code, Some(0 | 7)), "{whole:?}");
-    std::fs::write(place.path("cut.mcap"), &std::fs::read(place.path("whole.mcap")).unwrap()[..100]).unwrap();
-    let diagnose = ["diagnose", "cut.mcap", "--model", "plant/models/impulse-engine.toml", "--out", "out"];
-    for asked in [
-        &diagnose[..],
-        &["init", ".", "--recording", "cut.mcap", "--yes"],
-        &["stability", "cut.mcap"],
-        &["why", "cut.mcap"],
-        &["replay", "cut.mcap"],
-        &["inspect", "cut.mcap"],
-        &["bag", "export", "cut.mcap", "--out", "cut.csv"],
-    ] {
-        let ended = place.backdrive(asked);
-        assert!(ended.code == Some(3) && ended.stderr.contains("`backdrive bag recover cut.mcap --bag cut-saved.mcap`"), "{ended:?}");
-    }
-}
-
 /// A command that is put together by hand is not checked by anything.
 #[test]
 fn offered_commands_are_built_in_one_place() {

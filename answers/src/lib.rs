@@ -9,7 +9,6 @@
 pub mod asked;
 pub mod checks;
 pub mod error;
-pub mod estimate;
 pub mod found;
 pub mod opened;
 pub mod sentences;

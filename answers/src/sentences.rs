@@ -1,4 +1,4 @@
-//! The verdict of one axis in words, for terminal and page.
+//! Parts of a verdict in words, for terminal and page.
 
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_diagnosis::output_error::error_budget::{BudgetedError, Source};
@@ -30,31 +30,48 @@ fn supported(share: f64) -> String {
     format!("{word} ({})", words::share(share))
 }
 
+/// The words for an effect. Axes, arms and servo joints each have their own list of effects.
+pub type Words = fn(&str) -> String;
+
+/// A finding in a line: `dry friction at the drum, instead of damper: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)`.
+pub fn described(finding: &Finding, effect: Words) -> String {
+    let instead = if finding.replaces.is_empty() { String::new() } else { format!(", instead of {}", finding.replaces.join(" and ")) };
+    let (effect, place) = (effect(&finding.physics), words::place(&finding.place));
+    format!("{effect} {place}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding))
+}
+
 /// What could be instead of a finding, the three likeliest: `backlash between motor and drum (3 %)`.
-pub fn alternatives(finding: &Finding) -> Vec<String> {
-    let one = |other: &Alternative| format!("{} ({})", words::named(&other.physics, &other.place), words::share(other.confidence));
+pub fn alternatives(finding: &Finding, effect: Words) -> Vec<String> {
+    let one =
+        |other: &Alternative| format!("{} {} ({})", effect(&other.physics), words::place(&other.place), words::share(other.confidence));
     finding.alternatives.iter().take(3).map(one).collect()
+}
+
+/// A value with its interval: `101 mN (95 %: 98.0 mN to 104 mN)`.
+fn with_interval(value: f64, ci95: &Interval, unit: &str) -> String {
+    let interval = match ci95 {
+        // Three digits do not show a narrow interval.
+        [Some(low), Some(high)] if si(*low, unit) == si(*high, unit) => format!("95 %: ±{}", si(0.5 * (high - low), unit)),
+        [Some(low), Some(high)] => format!("95 %: {} to {}", si(*low, unit), si(*high, unit)),
+        [Some(low), None] => format!("95 %: above {}", si(*low, unit)),
+        [None, Some(high)] => format!("95 %: below {}", si(*high, unit)),
+        [None, None] => "not determined".to_string(),
+    };
+    format!("{} ({interval})", si(value, unit))
+}
+
+/// A parameter with its interval, and whether it is at its bound.
+pub fn estimate(estimate: &Estimate) -> String {
+    let Estimate { value, ci95, unit, at_bound } = estimate;
+    format!("{}{}", with_interval(*value, ci95, unit), if *at_bound { ", at its bound" } else { "" })
 }
 
 /// A parameter of a verdict: value and interval, or lists of them.
 fn parameter(parameter: &Parameter) -> String {
-    let one = |value: f64, ci95: &Interval, unit: &str| {
-        let interval = match ci95 {
-            // Three digits do not show a narrow interval.
-            [Some(low), Some(high)] if si(*low, unit) == si(*high, unit) => format!("95 %: ±{}", si(0.5 * (high - low), unit)),
-            [Some(low), Some(high)] => format!("95 %: {} to {}", si(*low, unit), si(*high, unit)),
-            [Some(low), None] => format!("95 %: above {}", si(*low, unit)),
-            [None, Some(high)] => format!("95 %: below {}", si(*high, unit)),
-            [None, None] => "not determined".to_string(),
-        };
-        format!("{} ({interval})", si(value, unit))
-    };
     match parameter {
-        Parameter::One(Estimate { value, ci95, unit, at_bound }) => {
-            format!("{}{}", one(*value, ci95, unit), if *at_bound { ", at its bound" } else { "" })
-        }
+        Parameter::One(one) => estimate(one),
         Parameter::List(list) => {
-            let each = list.value.iter().zip(&list.ci95).map(|(value, ci95)| one(*value, ci95, &list.unit));
+            let each = list.value.iter().zip(&list.ci95).map(|(value, ci95)| with_interval(*value, ci95, &list.unit));
             each.collect::<Vec<_>>().join("; ")
         }
     }
@@ -108,7 +125,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn a_finding_tells_its_parameters_and_how_sure_it_is() {
+    fn a_finding_reads_as_a_line_with_parameters_and_confidence() {
         let force = Parameter::One(Estimate { value: 0.101, ci95: [Some(0.098), Some(0.104)], at_bound: false, unit: "N".to_string() });
         let finding = Finding {
             physics: "coulomb".to_string(),
@@ -121,12 +138,15 @@ mod tests {
             alternatives: Vec::new(),
             closed_loop: None,
         };
-        assert_eq!(parameters(&finding), ["force 101 mN (95 %: 98.0 mN to 104 mN)"]);
-        assert_eq!(confidence(&finding), "well supported (97 %)");
+        let line = "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)";
+        assert_eq!(described(&finding, words::physics), line);
         let of_some_law = Finding { confidence: 0.13, family: Some(Family::Friction), family_confidence: 0.97, ..finding };
         assert_eq!(confidence(&of_some_law), "dry friction there: well supported (97 %); this law: barely supported (13 %)");
         let stiff = Parameter::One(Estimate { value: 2.0, ci95: [Some(1.5), None], at_bound: true, unit: "N".to_string() });
         assert_eq!(parameter(&stiff), "2.00 N (95 %: above 1.50 N), at its bound");
+        let replacing =
+            Finding { replaces: vec!["damper".to_string()], parameters: BTreeMap::from([("force".to_string(), stiff)]), ..of_some_law };
+        assert!(described(&replacing, words::physics).starts_with("dry friction at the drum, instead of damper: force 2.00 N"));
         let ci95 = vec![[Some(0.5), Some(1.5)], [Some(1.0), Some(3.0)]];
         let slip = Parameter::List(Estimates { value: vec![1.0, 2.0], ci95, unit: "N".to_string() });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");

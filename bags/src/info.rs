@@ -243,7 +243,10 @@ impl fmt::Display for BagInfo {
             writeln!(f, "  note: {note}")?;
         }
         if !self.ended_cleanly {
-            writeln!(f, "  the file was not closed; `{}` makes a clean copy", recover_command(Path::new(&self.path)))?;
+            match self.messages {
+                0 => writeln!(f, "  the file was not closed and is cut off before its first message; record it again")?,
+                _ => writeln!(f, "  the file was not closed; `{}` makes a clean copy", recover_command(Path::new(&self.path)))?,
+            }
             writeln!(f, "  it has no summary at its end, so all of it was read")?;
         }
         if let Some(damage) = &self.damage {

@@ -1,7 +1,6 @@
 //! A recording as it stands in its file: nothing is aligned, interpolated or refused, so that what is wrong with it can be seen.
 
 use crate::lerobot::episode_tables;
-use crate::offer::end_missing;
 use crate::signals::{Series, series_of};
 use crate::table::{Cells, Missing, Table, columns_of, name_of, read_table, unit_of};
 use crate::{BagError, ImportOptions, LerobotOptions, Reader, Signal};
@@ -92,10 +91,8 @@ fn of_table(episode: String, table: Table) -> RawRecording {
 /// The bag is damaged, or no topic has numbers that are read.
 pub fn raw_bag(reader: &Reader) -> Result<RawRecording, BagError> {
     let wanted = columns_of(reader, None)?;
-    let mut notes: Vec<String> = end_missing(reader.path(), reader.ended_cleanly())
-        .into_iter()
-        .chain(reader.topics().iter().filter_map(|topic| topic.unread()))
-        .collect();
+    let mut notes: Vec<String> =
+        reader.end_missing().into_iter().chain(reader.topics().iter().filter_map(|topic| topic.unread())).collect();
     notes.extend(reader.damage().iter().cloned());
     if wanted.is_empty() {
         let what = notes.first().cloned().unwrap_or_else(|| "has no topic with numbers".to_owned());

@@ -89,7 +89,8 @@ pub fn signals(reader: &Reader, wanted: &[Signal]) -> Result<Signals, BagError> 
     gather(reader, wanted, true, usize::MAX)
 }
 
-/// As [`signals`]; without `trim` over all steps that any signal has, and no further than where the first signal has more than `most` samples.
+/// As [`signals`]; without `trim` over all steps that any signal has, or all times at which each topic has messages. No further than where the first
+/// signal has more than `most` samples.
 pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize) -> Result<Signals, BagError> {
     let Gathered { mut series, clock, sparse } = series_of(reader, wanted, most)?;
     for (signal, series) in wanted.iter().zip(&mut series) {
@@ -110,7 +111,7 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
     let mut found = if series.iter().all(|series| !series.stepless) {
         by_step(&series, &sparse, trim, reader.header().map_or(0.0, |header| header.rate_hz), clock)
     } else {
-        by_time(wanted, &series)
+        by_time(wanted, &series, trim)
     };
     found.names = wanted.iter().map(|signal| signal.name.clone()).collect();
     found.alignment.missing = found.columns.iter().map(|column| column.iter().filter(|value| value.is_nan()).count() as u64).collect();
@@ -257,8 +258,18 @@ fn by_step(series: &[Series], sparse: &[bool], trim: bool, rate_hz: f64, clock: 
     Signals { t, steps: Some(steps), names: Vec::new(), columns, alignment }
 }
 
-fn by_time(wanted: &[Signal], series: &[Series]) -> Signals {
+fn by_time(wanted: &[Signal], series: &[Series], trim: bool) -> Signals {
     let mut alignment = Alignment::default();
+    // When its topic has messages: a field that some of them lack shortens nothing.
+    let messages: Vec<Vec<f64>> = series
+        .iter()
+        .map(|series| {
+            let mut times = series.times.clone();
+            times.sort_by(f64::total_cmp);
+            times.dedup();
+            times
+        })
+        .collect();
     let sorted: Vec<(Vec<f64>, Vec<f64>)> = series
         .iter()
         .map(|series| {
@@ -271,7 +282,10 @@ fn by_time(wanted: &[Signal], series: &[Series]) -> Signals {
         })
         .collect();
     // A signal without a single value does not bound the others, and stays empty.
-    let spoken = || sorted.iter().map(|points| &points.0).filter(|times| !times.is_empty());
+    let spoken = || {
+        let all = sorted.iter().zip(&messages).filter(|(points, _)| !points.0.is_empty());
+        all.map(|(points, messages)| if trim { &points.0 } else { messages })
+    };
     let first = spoken().map(|times| times[0]).fold(f64::NEG_INFINITY, f64::max);
     let last = spoken().map(|times| times[times.len() - 1]).fold(f64::INFINITY, f64::min);
     let within = |times: &Vec<f64>| times.iter().copied().filter(|time| (first..=last).contains(time)).collect::<Vec<f64>>();
@@ -282,7 +296,12 @@ fn by_time(wanted: &[Signal], series: &[Series]) -> Signals {
         false if within(at) == times => {
             at.iter().zip(values).filter(|(time, _)| (first..=last).contains(time)).map(|point| *point.1).collect()
         }
-        false => resample(signal.hold, at, values, &times),
+        false => {
+            let mut column = resample(signal.hold, at, values, &times);
+            let (from, to) = (at[0], at[at.len() - 1]);
+            column.iter_mut().zip(&times).filter(|(_, time)| !(from..=to).contains(*time)).for_each(|(value, _)| *value = f64::NAN);
+            column
+        }
     };
     let columns = sorted.iter().zip(wanted).map(column).collect();
     let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -294,4 +313,26 @@ fn by_time(wanted: &[Signal], series: &[Series]) -> Signals {
     }
     let t = times.iter().map(|time| time - times[0]).collect();
     Signals { t, steps: None, names: Vec::new(), columns, alignment }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_that_some_messages_lack_shortens_no_exported_row() {
+        let of = |present: std::ops::Range<usize>| {
+            let times: Vec<f64> = (0..10).map(|row| 0.1 * row as f64).collect();
+            let values = (0..10).map(|row| if present.contains(&row) { row as f64 } else { f64::NAN }).collect();
+            Series { steps: vec![0; 10], logged: times.clone(), times, values, stepless: true }
+        };
+        let (wanted, series) = ([Signal::new("a", "/t", "a"), Signal::new("b", "/t", "b")], [of(0..10), of(3..8)]);
+        let whole = by_time(&wanted, &series, false);
+        assert_eq!((whole.t.len(), whole.alignment.gaps), (10, 0));
+        assert_eq!(whole.columns[0], (0..10).map(f64::from).collect::<Vec<f64>>());
+        let measured: Vec<usize> = (0..10).filter(|row| whole.columns[1][*row].is_finite()).collect();
+        assert_eq!(measured, [3, 4, 5, 6, 7]);
+        // A fit needs all of them in every row.
+        assert_eq!(by_time(&wanted, &series, true).columns, [[3.0, 4.0, 5.0, 6.0, 7.0]; 2].map(Vec::from));
+    }
 }

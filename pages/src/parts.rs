@@ -25,6 +25,11 @@ pub fn lines_to_paste(page: &mut Page, lines: &[(String, Option<String>)]) {
     page.todo("Lines to paste into the set", lines);
 }
 
+/// Writes the loop gain as `μλ`. In a terminal and in files it is `mu*lambda`, and sentences are made once for all of them.
+pub fn symbols(page: &mut Page) {
+    page.spell("mu*lambda", "μλ");
+}
+
 /// The last part of a path.
 pub fn file_name(path: &str) -> &str {
     path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
@@ -45,6 +50,17 @@ pub fn sentence(clause: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_loop_gain_has_one_spelling_in_headings_tables_and_folded_parts() {
+        let mut page = Page::new("Stability at mu*lambda = 3");
+        page.text("from mu*lambda = 2 on").table(Table::new(["mu*lambda"]).row(["2"])).details("mu*lambda", |inside| {
+            inside.text("at μλ");
+        });
+        symbols(&mut page);
+        let html = page.html();
+        assert!(!html.contains("mu*lambda") && html.contains("<h1>Stability at μλ = 3</h1>") && html.contains("from μλ = 2 on"), "{html}");
+    }
 
     #[test]
     fn clauses_become_sentences_and_paths_lose_their_folders() {

@@ -2,6 +2,7 @@
 
 use crate::offered::Step;
 use crate::parts::{ending, large, todo};
+use backdrive_diagnosis::verdict::words::share;
 use backdrive_report::{Figure, Page, Plot, Table, Tone, number, percent};
 use backdrive_stability::session::Session;
 use backdrive_why::answer::Answer;
@@ -17,7 +18,7 @@ pub const NO_CAUSE: &str = "not known: the recording contains no model of the lo
 pub fn page(found: &Answer, session: &Session, tries: &[Step], steps: &[Step]) -> Page {
     let name = std::path::Path::new(&found.bag).file_name().map_or(found.bag.clone(), |n| n.to_string_lossy().into_owned());
     let mut page = Page::new(&format!("Cause of the oscillation: {name}"));
-    page.lead(tone(found), &crate::stability::spelled(&lead(found)));
+    page.lead(tone(found), &lead(found));
     todo(&mut page, steps);
     if let Some(beneath) = &found.beneath {
         page.text(&format!("Without that limit: {beneath}."));
@@ -72,7 +73,7 @@ fn tone(found: &Answer) -> Tone {
 fn lead(found: &Answer) -> String {
     let mut text = format!("{}, at μλ = {}.", large(&found.happens), number(found.gain));
     if let Some(first) = found.causes.first() {
-        text += &format!(" Most likely cause: {} (confidence {}).", first.kind.words(), percent(first.confidence));
+        text += &format!(" Most likely cause: {} (confidence {}).", first.kind.words(), share(first.confidence));
     }
     if let Some(remedy) = found.remedies.first().filter(|r| r.stops && found.happening.is_trouble()) {
         text += &format!(" First remedy: {}.", remedy.text);
@@ -128,7 +129,7 @@ fn causes(page: &mut Page, found: &Answer) {
         table.push([
             large(cause.kind.words()),
             cause.place.clone(),
-            percent(cause.confidence),
+            share(cause.confidence),
             if cause.seen { "yes" } else { "no" }.to_string(),
             cause.without.clone(),
             cause.edge_without.map_or_else(|| if cause.holds_without { "everything tried".to_string() } else { String::new() }, number),

@@ -170,7 +170,7 @@ fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Piece) 
 }
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, PredictError> {
-    let reader = Reader::open(path).map_err(PredictError::input)?;
+    let reader = Reader::open_begun(path).map_err(PredictError::input)?;
     let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&topic_of(name)).is_ok();
     let wanted: Vec<&str> = signals_of(model).into_iter().filter(|name| there(name)).collect();
     if wanted.is_empty() {

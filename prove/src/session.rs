@@ -17,7 +17,7 @@ pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64
     for name in &names {
         let (from, to) = (recorded.join(name), session.join(name));
         if Path::new(name).extension().is_some_and(|e| e == "mcap") {
-            let reader = Reader::open(&from).map_err(ProveError::input)?;
+            let reader = Reader::open_begun(&from).map_err(ProveError::input)?;
             let hidden: Vec<String> = reader.header().map_or_else(Vec::new, |header| hidden_topics(header, shows_hand));
             without(&from, &to, &|topic| hidden.iter().any(|h| h == topic), &|header| tell_less(header, shows_hand))
                 .map_err(ProveError::input)?;

@@ -102,6 +102,14 @@ impl Page {
         self.add(format_args!("<details><summary>{}</summary>\n{}</details>\n", escape(summary), inside.body))
     }
 
+    /// Writes a symbol in another way in all text of the page so far, its title and figures included.
+    pub fn spell(&mut self, written: &str, shown: &str) -> &mut Self {
+        let (written, shown) = (escape(written), escape(shown));
+        self.title = self.title.replace(&written, &shown);
+        self.body = self.body.replace(&written, &shown);
+        self
+    }
+
     fn add(&mut self, markup: std::fmt::Arguments) -> &mut Self {
         use std::fmt::Write;
         let _ = self.body.write_fmt(markup); // writing to a String cannot fail

@@ -33,7 +33,7 @@ impl Replay {
     /// # Errors
     /// The bag cannot be read, holds no operator, is the one that would be written, or its graph does not take the changes.
     pub fn read(path: &Path, changes: &Overrides, watch: &dyn Watch) -> Result<Replay, RunError> {
-        let reader = Reader::open(path).map_err(RunError::input)?;
+        let reader = Reader::open_begun(path).map_err(RunError::input)?;
         let mut changes = changes.clone();
         let duration_s = changes.duration_s;
         // Without a name for it, no second bag: the first must not be replaced.

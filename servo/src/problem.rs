@@ -55,7 +55,7 @@ fn names_in(path: &Path) -> Result<Vec<String>, ServoError> {
     if !is_bag(path) {
         return Ok(read_headings(path)?);
     }
-    let reader = Reader::open(path)?;
+    let reader = Reader::open_begun(path)?;
     Ok(reader.topics().iter().filter_map(|t| t.name.strip_prefix("/recording/").map(str::to_string)).collect())
 }
 

@@ -7,7 +7,7 @@ use backdrive_bags::Reader;
 use backdrive_diagnosis::arms::sentences::unexplained;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word};
+use backdrive_diagnosis::verdict::{ArmJoint, MODEL_FILE, Verdict, Word};
 use backdrive_nodes::graph::{NodeKind, Overrides, Settings};
 use backdrive_report::percent;
 use backdrive_stability::summary::graph_of;
@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 
 /// The graph on which a canceller is tried, where it is at hand.
 const CONTACT: &str = "launch/contact.toml";
+/// A model that leaves this much more of a joint's torque than the refitted one is not recommended.
+const WORSE: f64 = 1.02;
 
 /// What to do, the most useful first, with commands to copy. `out` is the folder of the model that was written.
 pub fn next(found: &Found, out: &Path) -> Vec<Step> {
@@ -74,7 +76,12 @@ fn of_arm(verdict: &Verdict, out: &Path) -> Vec<Step> {
     let model = out.join(MODEL_FILE);
     let (name, export) = (model.display(), Builder::verb("export").reads(&model).option("--to", "urdf"));
     let use_it = || [export.option_writes("--out", Path::new("arm.diagnosed.urdf")).build()];
+    let worse: Vec<String> = verdict.arm.iter().flat_map(|arm| &arm.joints).filter_map(worse_than_refitted).collect();
     match verdict.word {
+        Word::Missing | Word::Parameters | Word::Ambiguous if !worse.is_empty() => steps.push(Step::said(format!(
+            "Do not use {name}: it leaves more torque unexplained than the refitted model without these effects, {}.",
+            worse.join(", ")
+        ))),
         Word::Missing | Word::Parameters => steps.push(Step::new(
             format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
             use_it(),
@@ -101,6 +108,12 @@ fn of_arm(verdict: &Verdict, out: &Path) -> Vec<Step> {
         steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));
     }
     steps
+}
+
+/// Of a joint whose torque the diagnosed model predicts worse than the refitted one: both shares.
+fn worse_than_refitted(joint: &ArmJoint) -> Option<String> {
+    let shares = || format!("at {} {} instead of {}", joint.joint, percent(joint.diagnosed), percent(joint.refit));
+    (joint.diagnosed > WORSE * joint.refit).then(shares)
 }
 
 /// The same for servo joints, where the model may be used.
@@ -149,4 +162,21 @@ fn again(name: &str, usual: f64) -> Option<Offered> {
     let again: Builder = Builder::again();
     let now = again.value_of(name).and_then(|text| text.parse::<f64>().ok()).unwrap_or(usual);
     again.option(name, plain(2.0 * now)).build().filter(|offered| offered.is("diagnose"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arm_s_model_that_predicts_worse_than_the_refitted_one_is_named_with_both_shares() {
+        let joint = |refit: f64, diagnosed: f64| {
+            let text = serde_json::json!({ "joint": "elbow", "torque_rms": 1.0, "as_given": 5.48, "refit": refit, "diagnosed": diagnosed,
+                "loop_refit": null, "loop_diagnosed": null });
+            serde_json::from_value::<ArmJoint>(text).unwrap()
+        };
+        assert_eq!(worse_than_refitted(&joint(0.951, 1.187)).as_deref(), Some("at elbow 119 % instead of 95.1 %"));
+        assert_eq!(worse_than_refitted(&joint(0.206, 0.013)), None);
+        assert_eq!(worse_than_refitted(&joint(0.029, 0.029)), None);
+    }
 }

@@ -1,6 +1,7 @@
 //! The answer for a terminal.
 
 use crate::columns::columns;
+use backdrive_diagnosis::verdict::words::share;
 use backdrive_inspect::{Finding, Quantity, Report, Weight};
 use backdrive_pages::inspect::response;
 use backdrive_report::number;
@@ -59,7 +60,7 @@ fn signals(out: &mut String, report: &Report, several: bool) {
         let why = match signal.quantity {
             Quantity::Unknown => String::new(),
             _ if signal.why.is_empty() => String::new(),
-            _ => format!(", {:.0} % sure by {}", 100.0 * signal.sure, signal.why),
+            _ => format!(", {} sure by {}", share(signal.sure), signal.why),
         };
         let [low, high] = signal.range;
         let step = signal.step.map_or(String::new(), |step| format!(", step {}", number(step)));
@@ -77,7 +78,7 @@ fn said(finding: &Finding, several: bool) -> String {
     let at = finding
         .time_s
         .map_or(String::new(), |[from, to]| if from == to { format!(" (at {from:.2} s)") } else { format!(" ({from:.2} to {to:.2} s)") });
-    let mut text = format!("{word:<9} {file}{}{at}; {:.0} % sure\n", finding.message, 100.0 * finding.sure);
+    let mut text = format!("{word:<9} {file}{}{at}; {} sure\n", finding.message, share(finding.sure));
     for (number, line) in finding.todo.lines().enumerate() {
         let _ = writeln!(text, "{:<9} {line}", if number == 0 { "do" } else { "" });
     }

@@ -4,7 +4,6 @@ use crate::cli::words_of;
 use crate::offered::{Builder, Offered, Step, plain};
 use backdrive_bags::free;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_pages::stability::spelled;
 use backdrive_report::{number, percent};
 use backdrive_runs::source::runs_from_its_bag;
 use backdrive_stability::asked::Options;
@@ -27,7 +26,7 @@ pub fn next(found: &Answer, options: &Options, asked: Option<&Graph>) -> Vec<Ste
                 false => "The gain may rise.",
             };
             steps.push(Step::said(format!(
-                "The stability limit is {} dB away. {advice} (6 dB below it, the usual reserve: μλ = {}.)",
+                "The stability limit is {} dB away. {advice} (6 dB below it, the usual reserve: mu*lambda = {}.)",
                 number(db),
                 number(lower(limit))
             )));
@@ -35,13 +34,13 @@ pub fn next(found: &Answer, options: &Options, asked: Option<&Graph>) -> Vec<Ste
             steps.push(Step::new(text, [at(found, options, asked, limit, "at-the-limit.html")]));
         }
         (Word::Stable, None, Some(least)) => {
-            steps.push(Step::said(format!("No stability limit was found up to μλ = {}, the highest gain searched.", number(least))))
+            steps.push(Step::said(format!("No stability limit was found up to mu*lambda = {}, the highest gain searched.", number(least))))
         }
         (Word::LimitCycle | Word::Unstable | Word::Limited, limit, least) if limit.or(least).is_some_and(|limit| limit > 0.0) => {
             let safe = lower(limit.or(least).unwrap_or(gain)).min(gain);
             steps.push(Step::new(
                 format!(
-                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, with a reflected force of {} \
+                    "Lower the force scale: at mu*lambda = {} the loop keeps 6 dB to where it stops being stable, with a reflected force of {} \
                      of the present one.",
                     number(safe),
                     percent(safe / gain)
@@ -53,7 +52,7 @@ pub fn next(found: &Answer, options: &Options, asked: Option<&Graph>) -> Vec<Ste
         _ => {}
     }
     if let Some(advice) = &found.advice {
-        let text = format!("To record for a better answer: {}.", spelled(advice).trim_end_matches('.'));
+        let text = format!("To record for a better answer: {}.", advice.trim_end_matches('.'));
         steps.push(Step::new(text, dithered(options, asked, advice)));
     }
     if found.checks.iter().any(|c| !c.agrees) {

@@ -1,6 +1,7 @@
 //! The answer for a terminal.
 
 use crate::offered::{Step, lines};
+use backdrive_diagnosis::verdict::words::share;
 use backdrive_pages::why::NO_CAUSE;
 use backdrive_why::answer::Answer;
 use backdrive_why::cause::Cause;
@@ -63,5 +64,6 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
 
 fn of_cause(cause: &Cause) -> String {
     let place = if cause.place.is_empty() { String::new() } else { format!(" ({})", cause.place) };
-    format!("{}{place}, confidence {:.2}: {}; without it: {}", cause.kind.words(), cause.confidence, cause.evidence, cause.without)
+    let confidence = share(cause.confidence);
+    format!("{}{place}, confidence {confidence}: {}; without it: {}", cause.kind.words(), cause.evidence, cause.without)
 }

@@ -7,7 +7,7 @@ use crate::resimulate::sweep::sweep;
 use crate::resimulate::{Gain, Run, RunOptions, Scenario};
 use crate::roles::Roles;
 use crate::session::Session;
-use crate::summary::graph_of;
+use crate::summary::{SummaryError, graph_of};
 use crate::verdict::{Question, Swapped, is_coupled};
 use backdrive_bags::Reader;
 use backdrive_control::operator::Intent;
@@ -85,9 +85,11 @@ impl Asked {
         if path.is_dir() {
             return Err(AskedError(which_bag(path)));
         }
-        let reader = Reader::open(path).map_err(wrong)?;
-        let hint = if reader.without_messages().is_some() { "" } else { "; a bag that backdrive did not record needs --roles FILE" };
-        let recorded = graph_of(&reader, &Overrides::default()).map_err(|e| AskedError(format!("{e}{hint}")))?;
+        let reader = Reader::open_begun(path).map_err(wrong)?;
+        let recorded = graph_of(&reader, &Overrides::default()).map_err(|e| match e {
+            SummaryError::NoGraph { .. } => AskedError(format!("{e}; a bag that backdrive did not record needs --roles FILE")),
+            _ => wrong(e),
+        })?;
         let graph = graph_of(&reader, changes).map_err(wrong)?;
         let mut session = Session::from_bag(&reader, &recorded).map_err(wrong)?;
         let mut intents = recorded_intents(&session);

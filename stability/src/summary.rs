@@ -63,7 +63,7 @@ pub enum SummaryError {
 pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, SummaryError> {
     let path = reader.path();
     let no_graph = |why: String| SummaryError::NoGraph { path: path.to_path_buf(), why };
-    let not_begun = || reader.without_messages().map_or("is not a bag of a run: it contains no graph".to_string(), |cut| cut.to_string());
+    let not_begun = || reader.without_messages().unwrap_or_else(|| "is not a bag of a run: it contains no graph".to_string());
     let header = reader.header().ok_or_else(|| no_graph(not_begun()))?;
     if header.graph_toml.is_empty() {
         return Err(no_graph("contains recordings, but no graph to run".to_string()));

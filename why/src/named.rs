@@ -95,11 +95,11 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
     let size = |f: &PhysicsFound| f.size.as_ref().map_or_else(String::new, |(name, value, unit)| format!(", {name} {value:.4} {unit}"));
     if let Some(first) = device.physics.first() {
         let text = format!(
-            "the master differs by {share:.0} % from its model; a diagnosis of the bag finds {} at {}{} (confidence {:.2})",
+            "the master differs by {share:.0} % from its model; a diagnosis of the bag finds {} at {}{} (confidence {})",
             first.physics.replace('_', " "),
             first.place,
             size(first),
-            first.confidence
+            backdrive_diagnosis::verdict::words::share(first.confidence)
         );
         return (kind_of(first), first.place.clone(), text);
     }

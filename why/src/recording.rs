@@ -10,7 +10,7 @@ use backdrive_stability::by_itself::recorded::Recorded;
 use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
 use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
-use backdrive_stability::summary::graph_of;
+use backdrive_stability::summary::{SummaryError, graph_of};
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,9 +49,11 @@ impl Recording {
             let session = Session::from_roles(path, &Roles::load(roles).map_err(wrong)?).map_err(wrong)?;
             return Ok(Recording { session, ours: None });
         }
-        let reader = Reader::open(path).map_err(wrong)?;
-        let hint = if reader.without_messages().is_some() { "" } else { "; a recording that backdrive did not make needs --roles FILE" };
-        let graph = graph_of(&reader, &Overrides::default()).map_err(|e| RecordingError(format!("{e}{hint}")))?;
+        let reader = Reader::open_begun(path).map_err(wrong)?;
+        let graph = graph_of(&reader, &Overrides::default()).map_err(|e| match e {
+            SummaryError::NoGraph { .. } => RecordingError(format!("{e}; a recording that backdrive did not make needs --roles FILE")),
+            _ => wrong(e),
+        })?;
         let mut session = Session::from_bag(&reader, &graph).map_err(wrong)?;
         let recorded = Recorded::read(&reader).map_err(wrong)?;
         let mut intents = recorded_intents(&session);

@@ -1,13 +1,14 @@
 //! What a diagnosis of an arm prints.
 
+use crate::sentences::{alternatives, described};
 use backdrive_diagnosis::arms::diagnose::{Found, Tried};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::arms::sentences::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::verdict::Word;
 use backdrive_diagnosis::verdict::words as said;
-use backdrive_diagnosis::verdict::{Estimate, Finding, Parameter, Word};
 use backdrive_plant::robot::JointKind;
-use backdrive_report::{number, si};
+use backdrive_report::number;
 use std::fmt::Write as _;
 
 /// What was found, for a terminal.
@@ -24,13 +25,8 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
     }
     line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
     for finding in &verdict.findings {
-        line("found", finding_text(finding));
-        let others: Vec<String> = finding
-            .alternatives
-            .iter()
-            .take(3)
-            .map(|a| format!("{} {} ({})", words(&a.physics), said::place(&a.place), said::share(a.confidence)))
-            .collect();
+        line("found", described(finding, words));
+        let others = alternatives(finding, words);
         if !others.is_empty() {
             line("", format!("or instead {}", others.join(", ")));
         }
@@ -39,7 +35,7 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
         for (joint, coordinate) in arm.joints.iter().zip(problem.tree.coordinates()) {
             let unit = if coordinate.kind == JointKind::Revolute { "N m" } else { "N" };
             let in_loop = match (joint.loop_refit, joint.loop_diagnosed) {
-                (Some(before), Some(after)) => format!("; in closed loop {} and {}", said::share(before), said::share(after)),
+                (Some(before), Some(after)) => format!("; in closed loop {:.1} % and {:.1} %", 100.0 * before, 100.0 * after),
                 _ => String::new(),
             };
             line(
@@ -68,30 +64,6 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
         line("note", note.clone());
     }
     out.trim_end().to_string()
-}
-
-fn finding_text(finding: &Finding) -> String {
-    let numbers: Vec<String> = finding
-        .parameters
-        .iter()
-        .map(|(name, value)| match value {
-            Parameter::One(Estimate { value, ci95: [Some(low), Some(high)], unit, .. }) => {
-                format!("{} {} (95 %: {} to {})", name.replace('_', " "), si(*value, unit), si(*low, unit), si(*high, unit))
-            }
-            Parameter::One(Estimate { value, unit, .. }) => format!("{} {}", name.replace('_', " "), si(*value, unit)),
-            Parameter::List(list) => {
-                let all: Vec<String> = list.value.iter().map(|x| number(*x)).collect();
-                format!("{} ({}) {}", name.replace('_', " "), all.join(", "), list.unit)
-            }
-        })
-        .collect();
-    format!(
-        "{} {}: {}; confidence {}",
-        words(&finding.physics),
-        said::place(&finding.place),
-        numbers.join(", "),
-        said::share(finding.confidence)
-    )
 }
 
 /// What the search fitted in full, round by round.

@@ -1,12 +1,12 @@
 //! What a diagnosis of one axis prints: a dozen lines for a person, from the same data as the verdict file.
 
-use crate::sentences::{alternatives, confidence, errors, next_experiment, parameters, shows};
+use crate::sentences::{alternatives, described, errors, next_experiment, shows};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::belief::parameters::rows;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::words;
-use backdrive_diagnosis::verdict::{Finding, HeldOut, Remaining};
+use backdrive_diagnosis::verdict::{HeldOut, Remaining};
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
 
@@ -35,8 +35,8 @@ pub(crate) fn text(found: &Diagnosis) -> String {
     line("refit", refit(found));
     line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
     for finding in &verdict.findings {
-        line(if verdict.word.claims() { "found" } else { "nearest" }, described(finding));
-        let others = alternatives(finding);
+        line(if verdict.word.claims() { "found" } else { "nearest" }, described(finding, words::physics));
+        let others = alternatives(finding, words::physics);
         if !others.is_empty() {
             line("", format!("or instead {}", others.join(", ")));
         }
@@ -123,12 +123,6 @@ fn held_out(held: &HeldOut, noise: &str) -> String {
     )
 }
 
-fn described(finding: &Finding) -> String {
-    let instead = if finding.replaces.is_empty() { String::new() } else { format!(", instead of {}", finding.replaces.join(" and ")) };
-    let named = words::named(&finding.physics, &finding.place);
-    format!("{named}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding))
-}
-
 /// What the explanation leaves over, beside what was found; `None` where that is the sensors' noise.
 fn remains(left: &Remaining) -> Option<String> {
     let place = shows(left.shows.as_ref()?);
@@ -143,26 +137,7 @@ fn remains(left: &Remaining) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use backdrive_diagnosis::hypothesis::Place;
-    use backdrive_diagnosis::verdict::{Estimate, Parameter, Where};
-    use std::collections::BTreeMap;
-
-    #[test]
-    fn a_finding_reads_as_a_line() {
-        let force = Parameter::One(Estimate { value: 0.101, ci95: [Some(0.098), Some(0.104)], at_bound: false, unit: "N".to_string() });
-        let finding = Finding {
-            physics: "coulomb".to_string(),
-            place: Place::Between("drum".to_string(), "ground".to_string()),
-            parameters: BTreeMap::from([("force".to_string(), force)]),
-            replaces: Vec::new(),
-            confidence: 0.97,
-            family: None,
-            family_confidence: 0.0,
-            alternatives: Vec::new(),
-            closed_loop: None,
-        };
-        assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
-    }
+    use backdrive_diagnosis::verdict::Where;
 
     #[test]
     fn what_remains_is_told_only_where_it_is_more_than_noise() {

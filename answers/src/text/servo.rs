@@ -1,8 +1,6 @@
 //! What a diagnosis of servo joints prints.
 
-use crate::estimate::estimate;
-use backdrive_diagnosis::verdict::words as said;
-use backdrive_diagnosis::verdict::{Finding, Parameter};
+use crate::sentences::{alternatives, described, estimate};
 use backdrive_report::number;
 use backdrive_servo::diagnose::Found;
 use backdrive_servo::problem::Problem;
@@ -24,9 +22,8 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
     }
     line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
     for finding in &verdict.findings {
-        line("found", finding_text(finding));
-        let others: Vec<String> =
-            finding.alternatives.iter().take(3).map(|a| format!("{} ({})", words(&a.physics), said::share(a.confidence))).collect();
+        line("found", described(finding, words));
+        let others = alternatives(finding, words);
         if !others.is_empty() {
             line("", format!("or instead {}", others.join(", ")));
         }
@@ -66,25 +63,6 @@ pub(crate) fn text(problem: &Problem, found: &Found) -> String {
         line("note", note.clone());
     }
     out.trim_end().to_string()
-}
-
-/// A finding with its parameters.
-fn finding_text(finding: &Finding) -> String {
-    let numbers: Vec<String> = finding
-        .parameters
-        .iter()
-        .filter_map(|(name, value)| match value {
-            Parameter::One(one) => Some(format!("{} {}", name.replace('_', " "), estimate(one))),
-            Parameter::List(_) => None,
-        })
-        .collect();
-    format!(
-        "{} {}: {}; confidence {}",
-        words(&finding.physics),
-        said::place(&finding.place),
-        numbers.join(", "),
-        said::share(finding.confidence)
-    )
 }
 
 fn looked_at(adds: &[&str], drops: Option<&str>) -> String {

@@ -182,10 +182,27 @@ impl Reader {
         self.closed
     }
 
-    /// A sentence for a file that breaks off before its first message, with the command that saves what there is; `None` for any other.
+    /// Opens a bag whose messages are needed.
+    ///
+    /// # Errors
+    /// Those of [`Reader::open`], or the file is cut off before its first message.
+    pub fn open_begun(path: &Path) -> Result<Reader, BagError> {
+        let reader = Reader::open(path)?;
+        match reader.without_messages() {
+            Some(what) => Err(BagError::File { path: path.to_owned(), what }),
+            None => Ok(reader),
+        }
+    }
+
+    /// A sentence for a file that breaks off before its first message, so that nothing of it can be saved; `None` for any other.
     pub fn without_messages(&self) -> Option<String> {
         let is_empty = || self.messages().is_ok_and(|mut all| all.next().is_none());
-        if self.closed || !is_empty() { None } else { end_missing(&self.path, self.closed) }
+        (!self.closed && is_empty()).then(|| "the file was not closed and is cut off before its first message; record it again".to_owned())
+    }
+
+    /// A sentence for a file that was not closed, with the command that saves what there is; `None` for one that was.
+    pub(crate) fn end_missing(&self) -> Option<String> {
+        self.without_messages().or_else(|| end_missing(&self.path, self.closed))
     }
 
     /// Profile of the file, such as `ros2`.

@@ -3,7 +3,6 @@
 use super::bag_columns::{columns_of, was_table};
 use super::types::{Cells, Column, Table};
 use crate::number_type::NumberType;
-use crate::offer::end_missing;
 use crate::signals::{TIME_TOPIC, gather};
 use crate::{BagError, Reader};
 
@@ -16,7 +15,7 @@ pub(crate) fn table_of(reader: &Reader, topics: Option<&[String]>) -> Result<Tab
     let asked = |name: &str| topics.is_none_or(|topics| topics.iter().any(|topic| topic == name));
     let unread: Vec<String> = reader.topics().iter().filter(|topic| asked(&topic.name)).filter_map(|topic| topic.unread()).collect();
     if wanted.is_empty() {
-        let why: Vec<String> = end_missing(reader.path(), reader.ended_cleanly()).into_iter().chain(unread).collect();
+        let why: Vec<String> = reader.end_missing().into_iter().chain(unread).collect();
         let why = if why.is_empty() { String::new() } else { format!(": {}", why.join("; ")) };
         return Err(BagError::Usage(format!("{} has no numbers to export{why}", reader.path().display())));
     }

@@ -144,7 +144,7 @@ fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Resu
             e
         })?);
     }
-    let reader = Reader::open(&path).map_err(|e| ArmError::Bag(e.to_string()))?;
+    let reader = Reader::open_begun(&path).map_err(|e| ArmError::Bag(e.to_string()))?;
     recording(&reader, Some(&names), &set.columns, &piece, &|_| Hold::Linear).map_err(|e| {
         let of = |wanted: &str, part: Option<&str>| {
             let is_there = |signal: &str| {

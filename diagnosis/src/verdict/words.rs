@@ -65,12 +65,13 @@ fn sized(parameter: &Parameter) -> Option<String> {
     Some(format!("{number} {prefix}{unit}").trim_end().to_string())
 }
 
-/// A share as a reader takes it: `97 %`, `below 0.1 %`, `above 99.9 %`.
+/// A share or a confidence: `97 %`, `99.6 %`, `below 0.1 %`, `above 99.9 %`. No estimate is written as `0 %` or `100 %`.
 pub fn share(value: f64) -> String {
     match value {
         v if !v.is_finite() => "unknown".to_string(),
         v if v < 1e-3 => "below 0.1 %".to_string(),
         v if v > 0.999 => "above 99.9 %".to_string(),
+        v if v >= 0.995 => format!("{} %", backdrive_plant::write::round_significant(100.0 * v, 3)),
         v => format!("{} %", backdrive_plant::write::round_significant(100.0 * v, 2)),
     }
 }
@@ -103,6 +104,7 @@ mod tests {
 
     #[test]
     fn a_share_has_no_exponent() {
-        assert_eq!([5.05e-123, 0.04, 0.97, 0.9999].map(share), ["below 0.1 %", "4 %", "97 %", "above 99.9 %"]);
+        let said = ["below 0.1 %", "0.23 %", "4 %", "97 %", "99 %", "99.6 %", "99.9 %", "above 99.9 %", "above 99.9 %"];
+        assert_eq!([5.05e-123, 0.0023, 0.04, 0.97, 0.9949, 0.9962, 0.999, 0.9999, 1.0].map(share), said);
     }
 }

@@ -1,7 +1,7 @@
 //! Tables of an arm: findings, joints, inertial parameters, what was tried, logs.
 
 use crate::parts::{file_name, sentence};
-use backdrive_answers::sentences::{confidence, parameters};
+use backdrive_answers::sentences::{alternatives, confidence, parameters};
 use backdrive_diagnosis::arms::diagnose::Tried;
 use backdrive_diagnosis::arms::judge::AGAINST;
 use backdrive_diagnosis::arms::problem::Problem;
@@ -29,12 +29,7 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
     let mut table = Table::new(headers);
     for finding in all {
         let sure = if finding.confidence > 0.8 { Tone::Good } else { Tone::Unsure };
-        let others: Vec<String> = finding
-            .alternatives
-            .iter()
-            .take(3)
-            .map(|a| format!("{} {} ({})", words(&a.physics), said::place(&a.place), said::share(a.confidence)))
-            .collect();
+        let others = alternatives(finding, words);
         let mut row = vec![Cell::from(words(&finding.physics)), said::place(&finding.place).into(), parameters(finding).join("; ").into()];
         row.extend(replacing.then(|| Cell::from(finding.replaces.join(", "))));
         row.extend([Cell::tone(confidence(finding), sure), others.join("; ").into()]);

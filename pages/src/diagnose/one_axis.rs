@@ -108,7 +108,7 @@ fn findings(page: &mut Page, verdict: &Verdict) {
         let mut row =
             vec![Cell::from(words::physics(&finding.physics)), words::place(&finding.place).into(), parameters(finding).join("; ").into()];
         row.extend(replacing.then(|| Cell::from(finding.replaces.join(", "))));
-        row.extend([Cell::tone(confidence(finding), sure), alternatives(finding).join("; ").into()]);
+        row.extend([Cell::tone(confidence(finding), sure), alternatives(finding, words::physics).join("; ").into()]);
         table.push(row);
     }
     page.table(table);

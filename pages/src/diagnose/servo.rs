@@ -3,8 +3,7 @@
 use super::about::About;
 use super::phrases::tone;
 use crate::parts::{ending, file_name, sentence, todo};
-use backdrive_answers::estimate::estimate;
-use backdrive_diagnosis::verdict::Parameter;
+use backdrive_answers::sentences::{alternatives, confidence, estimate, parameters};
 use backdrive_diagnosis::verdict::words as said;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_servo::diagnose::{Answer, Found, Judged};
@@ -47,17 +46,8 @@ pub(super) fn page(problem: &Problem, found: &Found, about: &About) -> Page {
         .findings
         .iter()
         .map(|f| {
-            let numbers: Vec<String> = f
-                .parameters
-                .iter()
-                .filter_map(|(name, p)| match p {
-                    Parameter::One(one) => Some(format!("{} {}", name.replace('_', " "), estimate(one))),
-                    Parameter::List(_) => None,
-                })
-                .collect();
-            let others: Vec<String> =
-                f.alternatives.iter().map(|a| format!("{} ({})", words(&a.physics), said::share(a.confidence))).collect();
-            vec![said::place(&f.place), words(&f.physics), numbers.join(", "), said::share(f.confidence), others.join(", ")]
+            let (numbers, others) = (parameters(f).join(", "), alternatives(f, words).join(", "));
+            vec![said::place(&f.place), words(&f.physics), numbers, confidence(f), others]
         })
         .collect();
     match rows.is_empty() {

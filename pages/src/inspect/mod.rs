@@ -3,6 +3,7 @@
 pub mod response;
 
 use crate::parts::{ending, lines_to_paste};
+use backdrive_diagnosis::verdict::words::share;
 use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Response, Signal, Weight};
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number};
 
@@ -39,7 +40,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
                 short(&finding.file).into(),
                 finding.joint.clone().unwrap_or_default().into(),
                 finding.message.clone().into(),
-                format!("{:.0} %", 100.0 * finding.sure).into(),
+                share(finding.sure).into(),
                 finding.todo.clone().into(),
             ]);
         }
@@ -70,7 +71,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
                 signal.name.clone(),
                 signal.quantity.text().to_string(),
                 signal.unit.clone().unwrap_or_default(),
-                format!("{:.0} %", 100.0 * signal.sure),
+                share(signal.sure),
                 signal.why.clone(),
                 number(low),
                 number(high),

@@ -1,12 +1,12 @@
 //! Where the energy goes, and how the environment is displayed.
 
-use super::words::capital;
+use crate::parts::sentence;
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number, percent, si};
 use backdrive_stability::energy::{AxisEnergy, EnergyAnswer};
 use backdrive_stability::transparency::Transparency;
 
 pub(super) fn energy(page: &mut Page, answer: &EnergyAnswer, what: &str) {
-    page.text(&capital(&answer.reason));
+    page.text(&sentence(&answer.reason));
     for axis in &answer.axes {
         let mut ports =
             Plot::new(&format!("{}: energy received by the ports, {what}", axis.name)).x_axis("time", "s").y_axis("energy", "J");
@@ -75,7 +75,7 @@ fn energy_numbers(page: &mut Page, axis: &AxisEnergy) {
                 b.environment_from
             )));
             for note in &b.notes {
-                page.text(&capital(note));
+                page.text(&sentence(note));
             }
         }
         (None, Some(why)) => {

@@ -9,7 +9,7 @@ mod response;
 mod words;
 
 use crate::offered::Step;
-use crate::parts::{ending, file_name, todo};
+use crate::parts::{ending, file_name, sentence, todo};
 pub use axes::CANCELLED;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 use backdrive_stability::frequency;
@@ -20,8 +20,7 @@ pub use gains::Point;
 use gains::gains;
 use measured::measured;
 use response::response;
-pub use words::spelled;
-use words::{capital, energy_verdict, interval, tone, verdict, word};
+use words::{energy_verdict, interval, tone, verdict, word};
 
 /// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty, `steps` what to do next.
 pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step]) -> Page {
@@ -32,12 +31,12 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step])
     });
     page.lead(tone(found.verdict), &lead(found));
     todo(&mut page, steps);
-    page.text(&capital(&found.reason));
+    page.text(&sentence(&found.reason));
     for d in &found.disagreements {
-        page.warning(&capital(&d.text));
+        page.warning(&sentence(&d.text));
     }
     for warning in &found.warnings {
-        page.note(&capital(&warning.to_string()));
+        page.note(&sentence(&warning.to_string()));
     }
     if is_pair {
         page.section("Coupling");
@@ -149,7 +148,7 @@ fn methods(found: &Answer) -> Table {
             edge(f.critical_gain, f.at_least).into(),
             f.critical_gain_ci95.map_or("–".to_string(), interval).into(),
             f.frequency_hz.map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
-            spelled(&f.reason).into(),
+            f.reason.clone().into(),
         ]);
     }
     match &found.resimulated {
@@ -159,7 +158,7 @@ fn methods(found: &Answer) -> Table {
             edge(again.edge.critical_gain, Some(again.edge.at_least)).into(),
             "–".into(),
             again.edge.frequency_hz.filter(|hz| *hz > 0.0).map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
-            spelled(&format!("{}; {}", again.outcome, again.edge.reason)).into(),
+            format!("{}; {}", again.outcome, again.edge.reason).into(),
         ]),
         None => table.push([
             Cell::from("re-simulation"),
@@ -167,7 +166,7 @@ fn methods(found: &Answer) -> Table {
             "–".into(),
             "–".into(),
             "–".into(),
-            spelled(found.no_resimulation.as_deref().unwrap_or_default()).into(),
+            found.no_resimulation.clone().unwrap_or_default().into(),
         ]),
     }
     let energy = found.resimulated.as_ref().map_or(&found.recorded_energy, |r| &r.energy);

@@ -1,6 +1,5 @@
 //! Verdicts and numbers in words.
 
-use crate::parts::sentence;
 use backdrive_report::{Cell, Tone, number};
 use backdrive_stability::energy::EnergyVerdict;
 use backdrive_stability::outcome::Outcome;
@@ -46,28 +45,5 @@ pub(super) fn interval((low, high): (f64, Option<f64>)) -> String {
     match high {
         Some(high) => format!("{} to {}", number(low), number(high)),
         None => format!("{} or more", number(low)),
-    }
-}
-
-/// A sentence from a clause: its first letter large, a full stop at its end, the gain as the page spells it.
-pub(super) fn capital(clause: &str) -> String {
-    sentence(&spelled(clause))
-}
-
-/// The gain as the page spells it; in a terminal and in files it is `mu*lambda`.
-pub fn spelled(text: &str) -> String {
-    text.replace("mu*lambda", "μλ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn clauses_become_sentences() {
-        assert_eq!(capital("äh, no"), "Äh, no.");
-        assert_eq!(capital("Done."), "Done.");
-        assert_eq!(capital(""), "");
-        assert_eq!(capital("the limit is mu*lambda = 3"), "The limit is μλ = 3.");
     }
 }

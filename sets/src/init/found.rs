@@ -103,10 +103,7 @@ pub fn recordings(options: &Options) -> Result<Recordings, InitError> {
     for path in &paths {
         all.push(match is_bag(path) {
             true => {
-                let reader = Reader::open(path).map_err(InitError::input)?;
-                if let Some(cut) = reader.without_messages() {
-                    return Err(InitError::input(format!("{}: {cut}", path.display())));
-                }
+                let reader = Reader::open_begun(path).map_err(InitError::input)?;
                 unread.extend(reader.topics().iter().filter_map(|topic| topic.unread()));
                 columns_of(&reader, None).map_err(InitError::input)?.into_iter().map(|signal| Column::of_topic(&reader, signal)).collect()
             }

@@ -44,7 +44,7 @@ impl Asked {
     pub fn read(options: &Options) -> Result<Asked, AskedError> {
         let path = &options.session;
         let bag = match path.extension().is_some_and(|e| e == "mcap") {
-            true => Some(Reader::open(path).map_err(wrong)?),
+            true => Some(Reader::open_begun(path).map_err(wrong)?),
             false => None,
         };
         let load = |coupling: Option<&str>| -> Result<Graph, AskedError> {

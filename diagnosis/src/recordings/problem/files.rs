@@ -49,12 +49,9 @@ fn from_csv(path: &Path, model: &Model, set: &RecordingSet, piece: &backdrive_pl
 }
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
-    let reader = Reader::open(path)?;
+    let reader = Reader::open_begun(path)?;
     let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&topic_of(name)).is_ok();
     let wanted: Vec<&str> = signals_of(model).into_iter().filter(|name| there(name)).collect();
-    if let Some(cut) = reader.without_messages() {
-        return Err(ProblemError::Set(format!("{}: {cut}", path.display())));
-    }
     if wanted.is_empty() {
         let asked = names(signals_of(model).into_iter());
         return Err(ProblemError::Set(format!("{}: state in [columns] of set.toml which topics hold {asked}", path.display())));
