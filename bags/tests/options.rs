@@ -1,4 +1,4 @@
-//! Options of imports and exports that do not go together, and recordings in memory.
+//! Options of imports and exports that contradict each other, and recordings in memory.
 
 use backdrive_bags::{
     BagError, ColumnMap, Contract, Export, ExportFormat, Import, ImportOptions, PlannedExport, Quantity, Reader, TableFormat, frame_of,
