@@ -84,7 +84,7 @@ pub fn ended(found: &Found, stop: &AtomicBool) -> u8 {
 /// What the command line asks.
 fn asked(options: &cli::Diagnose) -> Asked {
     Asked {
-        set: options.set.clone(),
+        set: options.set.clone().into(),
         model: options.model.clone(),
         grip: options.grip.clone(),
         ignore_signal: options.ignore_signal.clone(),

@@ -1,56 +1,73 @@
-//! `backdrive export`: a model as another program's text, and what that leaves out.
+//! `backdrive export`: a model as another program's text, and what that leaves out. The work is that of [`backdrive_predict::export`].
 
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
 use crate::output::may_replace;
 use crate::progress::busy;
-use backdrive_export::target::{Options, export as written};
-use backdrive_export::{Exported, LeftOut};
-use backdrive_plant::model::Model;
-use backdrive_predict::left_out::{Errors, errors};
+use backdrive_export::LeftOut;
+use backdrive_export::target;
+use backdrive_predict::export::{Done, Options};
+use backdrive_predict::left_out::Errors;
 use backdrive_report::percent;
-use serde_json::{Value, json};
+use std::path::Path;
 
 /// Exports, and prints what is left out.
 pub fn export(options: &cli::Export) -> Result<u8, Failure> {
-    if let Some(out) = &options.out {
-        may_replace(out, options.overwrite)?;
+    let done = exported_into(&resolved(options), options.out.as_deref(), options.overwrite)?;
+    if options.json {
+        output::json(&done.json(options.out.as_deref()))?;
+    } else {
+        told(options, &done)?;
+    }
+    Ok(ended(&done))
+}
+
+/// Exports, and writes the text where a file is given; notes go to the caller.
+///
+/// # Errors
+/// As of [`Done::of`]; the file is there and may not be replaced, or cannot be written.
+pub fn exported_into(options: &Options, out: Option<&Path>, overwrite: bool) -> Result<Done, Failure> {
+    if let Some(out) = out {
+        may_replace(out, overwrite)?;
         output::writable(out)?;
     }
-    let model = Model::load(&options.model)?;
-    let how = Options { to: options.to, language: options.language, width: options.width, step: options.step };
-    let exported = written(&model, &how).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
-    let errors = match options.on.is_empty() {
-        true => None,
-        false => Some(busy("simulating the recordings without the omitted parts", || {
-            errors(&options.on, &options.model, &options.ignore_signal, &exported.left_out)
-        })?),
+    let done = match options.on {
+        Some(_) => busy("simulating the recordings without the omitted parts", || Done::of(options))?,
+        None => Done::of(options)?,
     };
-    if let Some(out) = &options.out {
-        output::file(out, &exported.text)?;
+    if let Some(out) = out {
+        output::file(out, &done.exported.text)?;
     }
-    for note in exported.notes.iter().chain(errors.iter().flat_map(|e| &e.notes)) {
-        output::note(format_args!("note: {note}"));
+    done.notes().for_each(|note| output::note(format_args!("note: {note}")));
+    Ok(done)
+}
+
+/// The exit code of an export.
+pub fn ended(done: &Done) -> u8 {
+    if done.is_complete() { 0 } else { code::NEGATIVE }
+}
+
+/// The options of the work.
+fn resolved(asked: &cli::Export) -> Options {
+    Options {
+        model: asked.model.clone(),
+        how: target::Options { to: asked.to, language: asked.language, width: asked.width, step: asked.step },
+        on: Some(asked.on.clone()).filter(|on| !on.is_empty()).map(Into::into),
+        ignored: asked.ignore_signal.clone(),
     }
-    if options.json {
-        output::json(&as_json(&model, options, &exported, errors.as_ref()))?;
-    } else {
-        told(options, &exported, errors.as_ref())?;
-    }
-    Ok(if !exported.left_out.iter().any(LeftOut::matters) { 0 } else { code::NEGATIVE })
 }
 
 /// For a person: the text where it has no file, and the list.
-fn told(options: &cli::Export, exported: &Exported, errors: Option<&Errors>) -> Result<(), Failure> {
-    let list = list(options, &exported.left_out, errors);
+fn told(options: &cli::Export, done: &Done) -> Result<(), Failure> {
+    let list = list(options, &done.exported.left_out, done.errors.as_ref());
     match &options.out {
         Some(out) => {
             output::note(format_args!("wrote {}", out.display()));
             output::line(list)
         }
         None => {
-            output::text(&exported.text)?;
+            output::text(&done.exported.text)?;
             output::note(list);
             Ok(())
         }
@@ -89,27 +106,4 @@ fn list(options: &cli::Export, left_out: &[LeftOut], errors: Option<&Errors>) ->
         }
     }
     text.trim_end().to_string()
-}
-
-fn as_json(model: &Model, options: &cli::Export, exported: &Exported, errors: Option<&Errors>) -> Value {
-    let one = |(index, left): (usize, &LeftOut)| {
-        json!({
-            "part": left.part, "name": left.name, "kind": left.kind, "why": left.why, "instead": left.instead,
-            "changes_the_motion": !left.changes.is_empty(),
-            "nrmse_without": errors.and_then(|e| e.without.get(index).copied().flatten()),
-        })
-    };
-    let left_out: Vec<Value> = exported.left_out.iter().enumerate().map(one).collect();
-    let mut all = json!({
-        "model": model.name,
-        "to": options.to.word(),
-        "out": options.out,
-        "left_out": left_out,
-        "notes": exported.notes,
-        "held_out": errors.map(|e| json!({ "of": e.of, "nrmse": e.with_all, "nrmse_as_exported": e.as_exported })),
-    });
-    if options.out.is_none() {
-        all["text"] = json!(exported.text);
-    }
-    all
 }

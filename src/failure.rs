@@ -76,6 +76,7 @@ impl Failure {
     /// A bag or a table cannot be read, or not written.
     pub fn bag(error: BagError) -> Failure {
         let code = match &error {
+            BagError::Option(_) => code::USAGE,
             BagError::Create { .. } | BagError::Write { .. } => code::MACHINE,
             BagError::Io { .. }
             | BagError::Exists { .. }

@@ -26,7 +26,7 @@ use std::time::Duration;
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let asked = Options {
         model: options.model.clone(),
-        set: options.set.clone(),
+        set: options.set.clone().into(),
         grip: options.grip.clone(),
         ignored: options.ignore_signal.clone(),
         effort: options.effort,

@@ -40,7 +40,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let Prepared { plan, seen, records, assumed, .. } = prepared;
 
     let wrote = format!("{} and {}", model.display(), set.display());
-    let opened = open(std::slice::from_ref(&options.folder), None, None, &[])
+    let opened = open(&options.folder.as_path().into(), None, None, &[])
         .map_err(|e| Failure::input(format!("wrote {wrote}, but diagnose would refuse them: {e}")))?;
     let remarks = audit::audit(&opened.problem);
     let next = Builder::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();

@@ -12,7 +12,7 @@ mod columns;
 pub mod compare;
 pub mod diagnose;
 mod doctor;
-mod export;
+pub mod export;
 pub mod failure;
 pub mod fit;
 mod graph;
@@ -24,6 +24,7 @@ pub mod model_run;
 mod node;
 mod offered;
 pub mod output;
+pub mod program;
 mod progress;
 mod prove;
 mod replay;
@@ -38,6 +39,13 @@ pub mod why;
 
 use cli::{Cli, Command};
 use std::process::ExitCode;
+
+/// The program in the process of another one, such as Python's: runs the command line, and gives the exit code.
+pub fn main_as(called: program::Called) -> u8 {
+    program::state(called);
+    let code = main();
+    (0..=u8::MAX).find(|known| ExitCode::from(*known) == code).unwrap_or(1)
+}
 
 /// The program: runs the command line.
 pub fn main() -> ExitCode {

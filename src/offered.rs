@@ -6,6 +6,7 @@
 
 use crate::caller;
 use crate::cli::Cli;
+use crate::program::called;
 use backdrive_bags::{free, shell_word};
 pub use backdrive_pages::offered::{Offered, Step};
 use clap::Parser;
@@ -155,7 +156,7 @@ impl Builder {
 pub fn own_arguments() -> Vec<OsString> {
     match caller::caller() {
         Some(caller) => caller.arguments().into_iter().map(OsString::from).collect(),
-        None => std::env::args_os().skip(1).collect(),
+        None => called().arguments.clone(),
     }
 }
 

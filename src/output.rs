@@ -9,6 +9,7 @@
 use crate::caller;
 use crate::failure::{Failure, code};
 use crate::offered::own_command;
+use crate::program::called;
 use backdrive_bags::move_into_place;
 use backdrive_pages::parts::symbols;
 use backdrive_plant::recording::{Recording, write_csv};
@@ -96,7 +97,7 @@ fn tell_program(failure: &Failure) {
 
 /// Whether the command line asks for JSON. Of wrong usage nothing else is known.
 fn wants_json() -> bool {
-    std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json")
+    called().arguments.iter().take_while(|argument| *argument != "--").any(|argument| argument == "--json")
 }
 
 /// The command line of this program, or how it ends: wrong usage with 2, help and version with 0.
@@ -104,7 +105,8 @@ fn wants_json() -> bool {
 /// # Errors
 /// The exit code; everything is said by then.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
-    P::try_parse().map_err(|told| {
+    let words = std::iter::once("backdrive".into()).chain(called().arguments.iter().cloned());
+    P::try_parse_from(words).map_err(|told| {
         let printed = told.print().and_then(|()| io::stdout().flush());
         match written(printed) {
             Err(failure) if !told.use_stderr() => fail(&failure),

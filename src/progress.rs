@@ -2,6 +2,7 @@
 
 use crate::caller::{self, Progress};
 use crate::output;
+use crate::program::called;
 use backdrive_runs::Watch;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::any::Any;
@@ -86,6 +87,10 @@ pub fn stages<T>(work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T) -> T {
 pub struct Terminal(RefCell<Option<ProgressBar>>);
 
 impl Watch for Terminal {
+    fn node_command(&self) -> Vec<String> {
+        called().command.clone()
+    }
+
     fn note(&self, sentence: &str) {
         match &*self.0.borrow() {
             Some(bar) => bar.suspend(|| output::note(sentence)),

@@ -64,8 +64,7 @@ impl ServoRefit {
         open::hold_out(&mut set, told, &mut notes);
         notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
         if let Some(out) = out {
-            let files: Vec<PathBuf> =
-                std::iter::once(asked.model.clone()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
+            let files: Vec<PathBuf> = std::iter::once(asked.model.clone()).chain(set.paths()).collect();
             open::not_onto(out, &files, overwrite)?;
         }
         let problem = progress::busy("reading the recordings", || Problem::open(&set, Some(&asked.model))).map_err(Failure::input)?;

@@ -8,7 +8,7 @@ use crate::progress::busy;
 use crate::servo_runs;
 use backdrive_plant::model::Model;
 use backdrive_predict::held::held_model;
-use backdrive_predict::simulate::{Drive, Options, drives};
+use backdrive_predict::simulate::{Drive, Driver, Options, drives};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -72,7 +72,7 @@ fn run(drive: Drive, options: &Options, model: &Model) -> Result<Run, Failure> {
 /// The options of the work.
 fn resolved(asked: &cli::Simulate) -> Options {
     Options {
-        drive: asked.drive.clone(),
+        drive: Driver::Named(asked.drive.clone()),
         out: asked.out.clone(),
         input: asked.input.clone(),
         rate: asked.rate,

@@ -3,6 +3,7 @@
 
 mod system;
 
+use backdrive_control::coupling::LawKind;
 use backdrive_msgs::Message;
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
@@ -133,8 +134,8 @@ fn a_limit_cycle_below_a_step_of_the_encoder_is_seen_in_the_forces() {
 }
 
 /// The graph of a link of 20 ms each way, with this law.
-fn held_graph(law: &str, more: Overrides) -> Graph {
-    let changes = Overrides { coupling: Some(law.to_string()), ..more };
+fn held_graph(law: LawKind, more: Overrides) -> Graph {
+    let changes = Overrides { coupling: Some(law), ..more };
     Graph::load(&PathBuf::from(file("launch/coupling.toml")), &changes).unwrap()
 }
 
@@ -172,7 +173,7 @@ fn whatever_the_law_and_the_rate_nothing_that_shakes_is_called_stable() {
     let lambdas: &[f64] = if full { &[0.1, 0.3, 0.6, 1.0, 2.0, 4.0] } else { &[0.3, 2.0] };
     let mut counts = [0; 4];
     let mut wrong = Vec::new();
-    for law in ["direct", "wave", "passivity", "position_position", "four_channel", "virtual_coupling"] {
+    for (name, law) in LawKind::ALL {
         for rate in rates {
             for lambda in lambdas {
                 for free in [false, true] {
@@ -183,7 +184,7 @@ fn whatever_the_law_and_the_rate_nothing_that_shakes_is_called_stable() {
                     // Half a millimetre that does not fall is no settling. Without a law that reflects motion a loop in free motion is open.
                     let shakes = after > 0.5e-3 && after > 0.8 * before;
                     let rests = after < 1e-6;
-                    let what = format!("{law} {rate} Hz lambda {lambda} free {free}: {said:?}, moved {before:.2e} then {after:.2e}");
+                    let what = format!("{name} {rate} Hz lambda {lambda} free {free}: {said:?}, moved {before:.2e} then {after:.2e}");
                     match said {
                         Some(Outcome::Stable) => counts[0] += 1,
                         Some(Outcome::NotJudged { .. }) | None => counts[2] += 1,

@@ -1,13 +1,14 @@
 //! What a diagnosis is asked.
 
 use backdrive_diagnosis::options::Options;
+use backdrive_sets::Recordings;
 use std::path::PathBuf;
 
 /// What a diagnosis is asked, by whichever caller.
 #[derive(Debug, Clone, Default)]
 pub struct Asked {
-    /// A folder with set.toml, a set.toml, a folder of recordings, or recordings.
-    pub set: Vec<PathBuf>,
+    /// The recordings.
+    pub set: Recordings,
     /// The nominal model; without it the set's own.
     pub model: Option<PathBuf>,
     /// The grip that holds the nominal model; `none` for no hand.

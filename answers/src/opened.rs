@@ -99,7 +99,6 @@ fn servo(asked: &Asked, mut set: RecordingSet, is_stated: bool, model: Option<Pa
 }
 
 fn opened(asked: &Asked, device: Device, set: &RecordingSet, model: Option<&Path>, notes: Vec<String>) -> Opened {
-    let recordings = set.fit.iter().chain(&set.held_out).map(|file| set.path_of(file));
-    let files = model.map(Path::to_path_buf).into_iter().chain(recordings).collect();
-    Opened { device, options: asked.options.clone(), name: open::name_of(&asked.set), notes, files }
+    let files = model.map(Path::to_path_buf).into_iter().chain(set.paths()).collect();
+    Opened { device, options: asked.options.clone(), name: asked.set.name(), notes, files }
 }

@@ -143,6 +143,9 @@ pub enum BagError {
     /// The signals make no recording.
     #[error(transparent)]
     Recording(#[from] backdrive_plant::recording::RecordingError),
+    /// An option that does not go with the others, or with the file.
+    #[error("{0}")]
+    Option(String),
     /// What was asked for makes no sense.
     #[error("{0}")]
     Usage(String),

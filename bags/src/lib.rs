@@ -21,10 +21,12 @@ mod clock_offset;
 mod completeness;
 mod diff;
 mod error;
+mod export;
 mod field_path;
 mod foreign_code;
 mod framing;
 mod header;
+mod import;
 mod import_offer;
 mod index;
 mod info;
@@ -62,7 +64,9 @@ pub use clock_offset::{CLOCK_OFFSET, ClockOffset};
 pub use completeness::{Completeness, TopicCompleteness};
 pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};
 pub use error::BagError;
+pub use export::{Export, ExportFormat, Missing, PlannedExport};
 pub use header::{BagHeader, Clock, TopicInfo};
+pub use import::{Import, Imported, Planned, Report};
 pub use import_offer::import_command;
 pub use info::{BagInfo, TopicSummary, check, info};
 pub use lerobot::{CommandedAt, Contract, Episode, LerobotOptions, LerobotReport, PerJoint, export_lerobot, import_lerobot, is_lerobot};
@@ -79,7 +83,8 @@ pub use recover::{RecoverReport, recover};
 pub use ros_bags::{RosbagReport, RosbagTopic, import_rosbag, is_rosbag};
 pub use signals::{Alignment, Signal, Signals, signals};
 pub use table::{
-    ColumnMap, ImportOptions, ImportReport, Quantity, TableFormat, columns_of, export_csv, export_table, import_csv, import_table, topic_of,
+    ColumnMap, ImportOptions, ImportReport, Quantity, TableFormat, columns_of, export_csv, export_table, frame_of, import_csv,
+    import_frame, import_table, topic_of,
 };
 pub use whole::{free, move_into_place};
 pub use without::without;

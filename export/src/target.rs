@@ -18,6 +18,9 @@ pub enum Target {
 }
 
 impl Target {
+    /// All of them.
+    pub const ALL: [Target; 4] = [Target::Mjcf, Target::Urdf, Target::Isaac, Target::Feedforward];
+
     /// Its word on the command line.
     pub fn word(self) -> &'static str {
         match self {

@@ -1,5 +1,6 @@
 //! Graph files with a coupling: its keys, and a coupling instead of scaling.
 
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides, Settings, coupling::conditions};
 use std::path::{Path, PathBuf};
 
@@ -7,8 +8,8 @@ fn file(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
-fn with(law: &str) -> Overrides {
-    Overrides { coupling: Some(law.into()), ..Overrides::default() }
+fn with(law: LawKind) -> Overrides {
+    Overrides { coupling: Some(law), ..Overrides::default() }
 }
 
 /// The graph of `launch/coupling.toml` with some of its text replaced.
@@ -29,8 +30,8 @@ fn law(graph: &Graph) -> &'static str {
 #[test]
 fn one_word_swaps_the_law_and_the_values_of_the_others_stay() {
     assert_eq!(law(&changed("law = \"wave\"", "law = \"passivity\"").unwrap()), "passivity");
-    for name in ["direct", "wave", "passivity", "position_position", "four_channel", "virtual_coupling"] {
-        assert_eq!(law(&Graph::load(&file("launch/coupling.toml"), &with(name)).unwrap()), name);
+    for (name, kind) in LawKind::ALL {
+        assert_eq!(law(&Graph::load(&file("launch/coupling.toml"), &with(kind)).unwrap()), name);
     }
 }
 
@@ -56,14 +57,14 @@ fn what_is_wrong_is_said_with_what_there_is() {
     });
     let hand = hand.unwrap_err();
     assert!(hand.contains("force of the hand") && hand.contains("\"hand\""), "{hand}");
-    let no_loop = Graph::load(&file("launch/identify.toml"), &with("wave")).unwrap_err().to_string();
+    let no_loop = Graph::load(&file("launch/identify.toml"), &with(LawKind::Wave)).unwrap_err().to_string();
     assert!(no_loop.contains("--coupling has no effect"), "{no_loop}");
 }
 
 #[test]
 fn a_coupling_takes_the_place_of_scaling_and_topics_keep_their_names() {
     let before = Graph::load(&file("launch/push-and-hold.toml"), &Overrides::default()).unwrap();
-    let after = Graph::load(&file("launch/push-and-hold.toml"), &with("position_position")).unwrap();
+    let after = Graph::load(&file("launch/push-and-hold.toml"), &with(LawKind::PositionPosition)).unwrap();
     let topic = |graph: &Graph, port: &str| {
         let at = graph.nodes.iter().position(|n| n.kind.closes_loop()).unwrap();
         graph.topic_of(at, port).name
@@ -85,7 +86,7 @@ fn what_impaired_the_way_to_the_slave_impairs_the_link() {
     let text = std::fs::read_to_string(&path).unwrap();
     let there = "from = \"scaling.command\"\nto = \"slave.command\"";
     let text = text.replace(there, &format!("{there}\ndelay = 5\nimpair = {{ delay_s = 0.03, loss = 0.1 }}"));
-    let graph = Graph::from_text(&text, &path, &with("wave"), &Files::Disk).unwrap();
+    let graph = Graph::from_text(&text, &path, &with(LawKind::Wave), &Files::Disk).unwrap();
     let of = |port: &str| graph.connections.iter().find(|c| c.from.1 == port).unwrap();
     let (link, command) = (of("to_far"), of("command"));
     assert_eq!((link.delay, link.impairment.map(|i| (i.delay_s, i.loss))), (5, Some((0.03, 0.1))));

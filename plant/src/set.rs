@@ -1,10 +1,11 @@
 //! Recording sets: a folder of recordings, with a `set.toml` that states which may be fitted and which are held out.
 
 use crate::elements::Range;
-use crate::recording::{Cell, Columns, JointColumns, Piece, Recording, read_columns, read_csv, read_joints};
+use crate::recording::{Cell, Columns, Frame, JointColumns, Piece, Recording, TableSource, read_columns, read_joints};
 use crate::robot::Payload;
 use crate::tomlfile::{FileError, Table, unknown};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// How the device starts in each file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,6 +68,8 @@ pub struct RecordingSet {
     pub ignore: Vec<String>,
     /// Whether recordings of rates that differ by more than a factor of two belong together.
     pub mixed_rates: bool,
+    /// Recordings in memory, by the names that they have in `fit` and `held_out`; the others are files.
+    pub frames: Vec<Arc<Frame>>,
 }
 
 impl RecordingSet {
@@ -74,11 +77,11 @@ impl RecordingSet {
     pub fn open(path: &Path) -> Result<RecordingSet, FileError> {
         if !path.is_dir() {
             let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-            return read(Table::open(path)?, folder);
+            return read(Table::open(path)?, folder, Vec::new());
         }
         let file = path.join("set.toml");
         match file.exists() {
-            true => read(Table::open(&file)?, path.to_path_buf()),
+            true => read(Table::open(&file)?, path.to_path_buf(), Vec::new()),
             false => {
                 let fit = recordings_in(path)?;
                 if fit.is_empty() {
@@ -87,6 +90,14 @@ impl RecordingSet {
                 Ok(RecordingSet::of_recordings(path.to_path_buf(), fit))
             }
         }
+    }
+
+    /// A set that a program states: the text of a `set.toml`, which files are relative to `folder`, and the recordings of it that are in memory.
+    ///
+    /// # Errors
+    /// The text is wrong, or names a file that is not there.
+    pub fn in_memory(text: &str, folder: PathBuf, frames: Vec<Frame>) -> Result<RecordingSet, FileError> {
+        read(Table::parse(text, "set.toml")?, folder, frames.into_iter().map(Arc::new).collect())
     }
 
     /// A set of recordings without further statements: all are for fitting, from rest, their columns as they are named. `fit` is relative to the
@@ -105,12 +116,34 @@ impl RecordingSet {
             sessions: Vec::new(),
             ignore: Vec::new(),
             mixed_rates: false,
+            frames: Vec::new(),
         }
     }
 
     /// Path of one of its files; of a piece that of the file that holds it.
     pub fn path_of(&self, file: &str) -> PathBuf {
         self.folder.join(source_of(&self.files, file))
+    }
+
+    /// One of its recordings in memory; of a piece that of the recording that it is a piece of. `None` of a file.
+    pub fn frame(&self, file: &str) -> Option<&Arc<Frame>> {
+        let source = source_of(&self.files, file);
+        self.frames.iter().find(|frame| frame.name() == source)
+    }
+
+    /// Where one of its tables is. An MCAP file is no table.
+    pub fn table(&self, file: &str) -> TableSource {
+        self.frame(file).map_or_else(|| TableSource::File(self.path_of(file)), |frame| TableSource::Frame(frame.clone()))
+    }
+
+    /// Whether one of its recordings is an MCAP file.
+    pub fn is_bag(&self, file: &str) -> bool {
+        self.frame(file).is_none() && self.path_of(file).extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+    }
+
+    /// Paths of the files among its recordings.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.fit.iter().chain(&self.held_out).filter(|file| self.frame(file).is_none()).map(|file| self.path_of(file)).collect()
     }
 
     /// What is particular to a file; the defaults where the set has no entry.
@@ -147,10 +180,10 @@ impl RecordingSet {
         Ok(())
     }
 
-    /// Reads the named signals of one of its CSV files. An MCAP file is read by the crate for bags, with
+    /// Reads the named signals of one of its tables. An MCAP file is read by the crate for bags, with
     /// `columns` and `rules_of` of this set.
-    pub fn read_csv(&self, file: &str, signals: &[&str]) -> Result<Recording, FileError> {
-        read_csv(&self.path_of(file), Some(signals), &self.columns, &self.rules_of(file).piece)
+    pub fn read_table(&self, file: &str, signals: &[&str]) -> Result<Recording, FileError> {
+        self.table(file).read(Some(signals), &self.columns, &self.rules_of(file).piece)
     }
 }
 
@@ -181,7 +214,7 @@ pub fn recordings_in(folder: &Path) -> Result<Vec<String>, FileError> {
     Ok(names)
 }
 
-fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
+fn read(mut top: Table, folder: PathBuf, frames: Vec<Arc<Frame>>) -> Result<RecordingSet, FileError> {
     let exists = |table: &Table, key: &str, name: &str| match folder.join(name).is_file() {
         true => Ok(()),
         false => Err(table.error_at(key, format!("there is no file \"{name}\" in {}", shown(&folder)))),
@@ -206,13 +239,16 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
     for (key, names) in [("fit", &fit), ("held_out", &held_out)] {
         for (i, name) in names.iter().enumerate() {
             let source = source_of(&files, name);
-            if !is_recording(source) {
+            let is_frame = frames.iter().any(|frame| frame.name() == source);
+            if !is_frame && !is_recording(source) {
                 return Err(top.error_at(
                     key,
                     format!("\"{source}\" is not a recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"),
                 ));
             }
-            exists(&top, key, source)?;
+            if !is_frame {
+                exists(&top, key, source)?;
+            }
             if names[..i].contains(name) {
                 return Err(top.error_at(key, format!("names \"{name}\" twice")));
             }
@@ -257,6 +293,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         sessions,
         ignore,
         mixed_rates,
+        frames,
     })
 }
 

@@ -5,7 +5,7 @@ mod skipped;
 
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::{
-    Cell, ColumnRule, Columns, Piece, Recording, Source, read_csv, read_headings, read_signals_of, signals_of, write_csv,
+    Cell, ColumnRule, Columns, Frame, Piece, Recording, Source, TableSource, read_csv, read_headings, signals_of, write_csv,
 };
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
 use backdrive_plant::tomlfile::FileError;
@@ -72,7 +72,7 @@ fn a_heading_may_name_its_unit_and_so_may_a_rule() {
     let text = "time,i,encoder\n0,1000,0\n100,2000,1000\n200,3000,2000\n";
     let dir = folder(&[("set.toml", set), ("x.csv", text)]);
     let set = RecordingSet::open(dir.path()).unwrap();
-    let r = set.read_csv("x.csv", &["torque", "angle"]).unwrap();
+    let r = set.read_table("x.csv", &["torque", "angle"]).unwrap();
     assert!((r.period - 1e-4).abs() < 1e-15);
     assert!((r.signal("torque").unwrap()[1] - 0.1).abs() < 1e-15 && (r.signal("angle").unwrap()[1] - 1.5).abs() < 1e-12);
     assert_eq!(r.check_units(&model), Ok(()));
@@ -95,7 +95,7 @@ fn logs_of_robots_controllers_are_read_where_columns_name_them() {
         let dir = folder(&[("set.toml", set), ("x.csv", text)]);
         let set = RecordingSet::open(dir.path()).unwrap();
         let signals: Vec<String> = set.joints.iter().flat_map(|j| [j.position(), j.velocity(), j.torque()]).collect();
-        let r = set.read_csv("x.csv", &signals.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+        let r = set.read_table("x.csv", &signals.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
         assert!((r.period - period).abs() < 1e-9, "{}", r.period);
         assert_eq!(r.signal("shoulder.position").unwrap(), [-1.5, -1.4, -1.3]);
         assert_eq!(r.signal("base.torque").unwrap(), [5.0, 6.0, 7.0]);
@@ -254,7 +254,7 @@ condition = { "inputs.position.offset" = "free" }
     let bare = folder(&[("b.csv", DATA), ("a.csv", DATA), ("notes.txt", "")]);
     let s = RecordingSet::open(bare.path()).unwrap();
     assert_eq!((s.fit.as_slice(), s.model.clone()), (["a.csv".to_string(), "b.csv".to_string()].as_slice(), None));
-    assert_eq!(s.read_csv("a.csv", &["y"]).unwrap().len(), 3);
+    assert_eq!(s.read_table("a.csv", &["y"]).unwrap().len(), 3);
 }
 
 #[test]
@@ -269,7 +269,7 @@ files.fast = { of = "log.csv", where = { run = 2 } }
     let dir = folder(&[("set.toml", set), ("log.csv", log)]);
     let s = RecordingSet::open(dir.path()).unwrap();
     assert_eq!((s.path_of("slow"), s.path_of("fast")), (dir.path().join("log.csv"), dir.path().join("log.csv")));
-    let y = |piece: &str| s.read_csv(piece, &["y"]).unwrap().signals[0].1.clone();
+    let y = |piece: &str| s.read_table(piece, &["y"]).unwrap().signals[0].1.clone();
     assert_eq!((y("slow"), y("fast")), (vec![10.0, 11.0], vec![12.0, 13.0]));
     let refused = |set: &str| {
         let dir = folder(&[("set.toml", set), ("log.csv", log), ("notes.txt", "")]);
@@ -285,7 +285,9 @@ fn columns_that_a_model_does_not_use_may_hold_anything() {
                  [[outputs]]\nname = \"x\"\nkind = \"position\"\nof = \"m\"\n[[outputs]]\nname = \"v\"\nkind = \"velocity\"\nof = \"m\"\n";
     let model = Model::from_toml(model, "m.toml").unwrap();
     let dir = folder(&[("a.csv", "t [ms],state,f,x [mm],note\n0,RUN,1,2,\n1,RUN,2,3,nan\n"), ("b.csv", "t,state,x\n0,RUN,1\n1,RUN,2\n")]);
-    let read = |name: &str, absent: bool| read_signals_of(&dir.path().join(name), &model, &Columns::new(), &Piece::default(), &|_| absent);
+    let read = |name: &str, absent: bool| {
+        TableSource::File(dir.path().join(name)).read_signals_of(&model, &Columns::new(), &Piece::default(), &|_| absent)
+    };
     let a = read("a.csv", false).unwrap();
     assert_eq!(a.signals, [("f".to_string(), vec![1.0, 2.0]), ("x".to_string(), vec![2e-3, 3e-3])]);
     let told = message(read("b.csv", false));
@@ -354,7 +356,7 @@ fn every_concealed_set_reads() {
         let model = Model::load(set.model.as_ref().unwrap()).unwrap_or_else(|e| panic!("{e}"));
         // Every set is opened; reading a few of the files is enough.
         for file in set.fit.iter().take(usize::from(count % 12 == 0)) {
-            let r = set.read_csv(file, &signals_of(&model)).unwrap_or_else(|e| panic!("{e}"));
+            let r = set.read_table(file, &signals_of(&model)).unwrap_or_else(|e| panic!("{e}"));
             assert!(r.is_regular(0.01) && r.len() > 1000);
         }
     }
@@ -370,4 +372,40 @@ fn times_that_are_even_but_for_their_rounding_stay_as_they_are_written() {
     let wandering: Vec<f64> = written.iter().enumerate().map(|(i, t)| t + 1e-4 * (i as f64).sin()).collect();
     let even = recording(&wandering).regular_for(&model).unwrap().t;
     assert!(even != wandering && even.windows(2).all(|w| (w[1] - w[0] - even[1] + even[0]).abs() < 1e-12));
+}
+
+#[test]
+fn a_set_in_memory_reads_as_its_files_do() {
+    let dir = folder(&[("a.csv", "t,run,f [N],x [mm]\n0,1,1,2\n0.1,1,2,3\n0.2,2,3,4\n0.3,2,4,5\n"), ("b.csv", "t,x\n0,1\n1,2\n")]);
+    let settings = "fit = [\"a.csv\", \"late\"]\nheld_out = [\"b.csv\"]\n[columns]\nangle = \"x\"\n\
+                    [files.late]\nof = \"a.csv\"\nwhere = { run = 2 }\n";
+    std::fs::write(dir.path().join("set.toml"), settings).unwrap();
+    let of_files = RecordingSet::open(dir.path()).unwrap();
+    let column = |heading: &str, values: [f64; 4]| (heading.to_string(), values.to_vec());
+    let columns = |x: f64| {
+        vec![
+            column("t", [0.0, 0.1, 0.2, 0.3]),
+            column("run", [1.0, 1.0, 2.0, 2.0]),
+            column("f [N]", [1.0, 2.0, 3.0, 4.0]),
+            column("x [mm]", [2.0, 3.0, x, 5.0]),
+        ]
+    };
+    let in_memory = |x: f64| {
+        let frame = Frame::new("a.csv", columns(x)).unwrap();
+        RecordingSet::in_memory(settings, dir.path().to_path_buf(), vec![frame]).unwrap()
+    };
+    let set = in_memory(4.0);
+    assert_eq!((set.paths().len(), set.is_bag("a.csv")), (1, false), "b.csv is the only file");
+    for (piece, signals) in [("a.csv", ["f", "angle"]), ("late", ["f", "angle"])] {
+        let (file, memory) = (of_files.read_table(piece, &signals).unwrap(), set.read_table(piece, &signals).unwrap());
+        assert_eq!((file.t, file.signals, file.units), (memory.t, memory.signals, memory.units), "{piece}");
+    }
+    assert_eq!(set.read_table("b.csv", &["angle"]).unwrap().len(), 2);
+    // A missing value is an error at its row, counted with the heading.
+    let error = in_memory(f64::NAN).read_table("a.csv", &["angle"]).unwrap_err();
+    assert_eq!((error.path.as_str(), error.line), ("a.csv", Some(4)), "{error}");
+    let missing = set.read_table("a.csv", &["speed"]).unwrap_err();
+    assert_eq!((missing.path.as_str(), missing.line), ("a.csv", Some(1)), "{missing}");
+    let uneven = Frame::new("a.csv", vec![("t".to_string(), vec![0.0, 1.0]), ("x".to_string(), vec![0.0])]).unwrap_err();
+    assert!(uneven.path == "a.csv" && uneven.message.contains('x'), "{uneven}");
 }

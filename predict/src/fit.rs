@@ -12,7 +12,7 @@ use backdrive_diagnosis::output_error::work::{Budget, Limit};
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::recordings::problem::Problem;
 use backdrive_diagnosis::search::{Search, search};
-use backdrive_sets::open;
+use backdrive_sets::{Recordings, open};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -25,8 +25,8 @@ const CORRELATED: f64 = 0.9;
 pub struct Options {
     /// The model file.
     pub model: PathBuf,
-    /// A folder with set.toml, a set.toml, a folder of recordings, or recordings.
-    pub set: Vec<PathBuf>,
+    /// The recordings.
+    pub set: Recordings,
     /// The grip that holds the model; `none` for no hand.
     pub grip: Option<PathBuf>,
     /// Recorded inputs that may have no place in the model.

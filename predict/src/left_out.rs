@@ -6,8 +6,8 @@ use backdrive_diagnosis::output_error::structure::Structure;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_export::{Change, LeftOut, change_all};
 use backdrive_plant::model::Model;
-use backdrive_sets::open;
-use std::path::{Path, PathBuf};
+use backdrive_sets::{Recordings, open};
+use std::path::Path;
 
 /// Errors of a model on recordings, as nrmse: over the standard deviation of what was measured, mean of all outputs and records.
 pub struct Errors {
@@ -27,7 +27,7 @@ pub struct Errors {
 ///
 /// # Errors
 /// When a recording is wrong, or the model itself cannot be simulated.
-pub fn errors(on: &[PathBuf], model: &Path, ignored: &[String], left_out: &[LeftOut]) -> Result<Errors, PredictError> {
+pub fn errors(on: &Recordings, model: &Path, ignored: &[String], left_out: &[LeftOut]) -> Result<Errors, PredictError> {
     let opened = open::open(on, Some(model), None, ignored)?;
     let problem = opened.problem;
     let (records, of) = match problem.held_out.is_empty() {

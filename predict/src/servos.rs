@@ -1,7 +1,7 @@
 //! Joints that position servos drive, run from the commands of recordings.
 
 use crate::error::PredictError;
-use crate::simulate::Options;
+use crate::simulate::{Driver, Options};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::servo::Numbers;
@@ -54,8 +54,14 @@ impl ServoRuns {
     /// # Errors
     /// A recording cannot be read, or none has a joint of the model.
     pub fn read(options: &Options, path: &Path, model: &Model) -> Result<ServoRuns, PredictError> {
-        let drive = PathBuf::from(&options.drive);
-        let (mut set, _) = open::set_of(std::slice::from_ref(&drive))?;
+        let (mut set, is_single) = match &options.drive {
+            Driver::Named(named) => {
+                let path = Path::new(named);
+                let is_set = path.extension().is_none_or(|e| e.eq_ignore_ascii_case("toml"));
+                (open::set_of(&path.into())?.0, path.is_file() && !is_set)
+            }
+            Driver::Set(set) => (set.as_ref().clone(), set.fit.len() + set.held_out.len() == 1),
+        };
         if let Some(columns) = &options.columns {
             let other = RecordingSet::open(columns)?;
             (set.columns, set.joints) = (other.columns, other.joints);
@@ -70,10 +76,7 @@ impl ServoRuns {
                 names.join(", ")
             )));
         }
-        let is_file = drive.is_file()
-            && drive.file_name().is_some_and(|n| n != "set.toml")
-            && drive.extension().is_some_and(|e| !e.eq_ignore_ascii_case("toml"));
-        let out = |file: &str| match is_file {
+        let out = |file: &str| match is_single {
             true => options.out.clone(),
             false => options.out.join(Path::new(Path::new(file).file_name().unwrap_or_default()).with_extension("csv")),
         };

@@ -4,17 +4,18 @@ use crate::error::PredictError;
 use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Hold, Model, OutputKind};
-use backdrive_plant::recording::{Columns, Piece, Recording, read_signals_of, signals_of};
+use backdrive_plant::recording::{Columns, Piece, Recording, TableSource, signals_of};
 use backdrive_plant::robot::Payload;
 use backdrive_plant::set::{Condition, RecordingSet};
 use backdrive_plant::stepper;
+use std::fmt::{self, Display, Formatter};
 use std::path::{Component, Path, PathBuf};
 
 /// What a model is run on, and how.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// A recording (CSV or bag), a folder with a set.toml, an excitation file, or an excitation such as `steps:amplitude=1,duration=2`.
-    pub drive: String,
+    /// What drives it.
+    pub drive: Driver,
     /// Where the prediction goes: a file, for several a folder.
     pub out: PathBuf,
     /// Which input an excitation drives; `None` for the first.
@@ -27,6 +28,24 @@ pub struct Options {
     pub noise: Option<u64>,
     /// A set.toml whose `[columns]` are used.
     pub columns: Option<PathBuf>,
+}
+
+/// What drives a model.
+#[derive(Debug, Clone)]
+pub enum Driver {
+    /// A recording (CSV or bag), a folder with a set.toml, an excitation file, or an excitation such as `steps:amplitude=1,duration=2`.
+    Named(String),
+    /// The recordings of a set that a program states.
+    Set(Box<RecordingSet>),
+}
+
+impl Display for Driver {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Driver::Named(name) => f.write_str(name),
+            Driver::Set(set) => f.write_str(set.fit.iter().chain(&set.held_out).next().map_or("no recording", String::as_str)),
+        }
+    }
 }
 
 /// What drives the model, where its prediction goes, and what is different in this experiment.
@@ -86,36 +105,25 @@ impl Drive {
 /// # Errors
 /// The recording, the set or the excitation cannot be read, or does not suit the model.
 pub fn drives(options: &Options, model: &Model) -> Result<Vec<Drive>, PredictError> {
-    let path = Path::new(&options.drive);
+    let named = match &options.drive {
+        Driver::Named(named) => named,
+        Driver::Set(set) => return of_set(set, model, &options.out, set.fit.len() + set.held_out.len() == 1),
+    };
+    let path = Path::new(named);
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let columns = match &options.columns {
         Some(set) => RecordingSet::open(set)?.columns,
         None => Columns::new(),
     };
     if path.is_dir() || path.file_name().is_some_and(|n| n == "set.toml") {
-        let set = RecordingSet::open(path)?;
-        set.check_conditions(model)?;
-        let files: Vec<&String> = set.fit.iter().chain(&set.held_out).collect();
-        return files
-            .into_iter()
-            .map(|file| {
-                let rules = set.rules_of(file);
-                let recording = read_recording(&set.path_of(file), model, &set.columns, &rules.piece)?;
-                // A recording outside the folder is simulated into the folder all the same, and not onto itself.
-                let path = Path::new(file);
-                let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-                let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };
-                Ok(Drive {
-                    recording,
-                    out: options.out.join(name.with_extension("csv")),
-                    condition: rules.condition,
-                    payload: rules.payload,
-                })
-            })
-            .collect();
+        return of_set(&RecordingSet::open(path)?, model, &options.out, false);
     }
     if extension == "csv" || extension == "mcap" {
-        let recording = read_recording(path, model, &columns, &Piece::default())?;
+        let recording = match extension.as_str() {
+            "mcap" => from_bag(path, model, &columns, &Piece::default())?,
+            _ => from_table(&TableSource::File(path.to_path_buf()), model, &columns, &Piece::default())?,
+        };
+        let recording = checked(recording, model, &path.display().to_string())?;
         return Ok(vec![Drive { recording, out: options.out.clone(), condition: Vec::new(), payload: None }]);
     }
     if extension == "toml" {
@@ -134,33 +142,51 @@ pub fn drives(options: &Options, model: &Model) -> Result<Vec<Drive>, PredictErr
             })
             .collect();
     }
-    let excitation: Excitation = options.drive.parse().map_err(|e| {
+    let excitation: Excitation = named.parse().map_err(|e| {
         PredictError::input(format!("{e}; it is not a recording either: those end in .csv or .mcap, or are a folder with a set.toml"))
     })?;
     let drive = [(options.input.clone(), excitation)];
-    Ok(vec![Drive {
-        recording: excited(model, &options.drive, &drive, options)?,
-        out: options.out.clone(),
-        condition: Vec::new(),
-        payload: None,
-    }])
+    Ok(vec![Drive { recording: excited(model, named, &drive, options)?, out: options.out.clone(), condition: Vec::new(), payload: None }])
 }
 
-/// The signals of a model from a recording: all of its inputs, and those of its outputs that were recorded.
-fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, PredictError> {
-    let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let is_hand = |name: &str| name.ends_with(".hand");
-    let recording = match is_bag {
-        true => from_bag(path, model, columns, piece)?,
-        false => read_signals_of(path, model, columns, piece, &is_hand)?,
+/// The recordings of a set, each with the conditions of its file. `out` is the file of the prediction of a single one, else a folder.
+fn of_set(set: &RecordingSet, model: &Model, out: &Path, is_single: bool) -> Result<Vec<Drive>, PredictError> {
+    set.check_conditions(model)?;
+    let one = |file: &String| {
+        let rules = set.rules_of(file);
+        let recording = match set.is_bag(file) {
+            true => from_bag(&set.path_of(file), model, &set.columns, &rules.piece)?,
+            false => from_table(&set.table(file), model, &set.columns, &rules.piece)?,
+        };
+        let recording = checked(recording, model, &set.table(file).name())?;
+        // A recording outside the folder is simulated into the folder all the same, and not onto itself.
+        let path = Path::new(file);
+        let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };
+        let out = if is_single { out.to_path_buf() } else { out.join(name.with_extension("csv")) };
+        Ok(Drive { recording, out, condition: rules.condition, payload: rules.payload })
     };
+    set.fit.iter().chain(&set.held_out).map(one).collect()
+}
+
+/// Whether an input is the motion of a hand, which recordings need not hold.
+fn is_hand(name: &str) -> bool {
+    name.ends_with(".hand")
+}
+
+/// The signals of a model from a table.
+fn from_table(table: &TableSource, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, PredictError> {
+    Ok(table.read_signals_of(model, columns, piece, &is_hand)?)
+}
+
+/// A recording that holds all inputs of a model, in units that suit it; `name` is where it was read.
+fn checked(recording: Recording, model: &Model, name: &str) -> Result<Recording, PredictError> {
     for input in &model.inputs {
         if recording.signal(&input.name).is_none() && !is_hand(&input.name) {
             let there: Vec<&str> = recording.signals.iter().map(|(name, _)| name.as_str()).collect();
             let there = if there.is_empty() { "nothing else".to_string() } else { there.join(", ") };
             return Err(PredictError::input(format!(
-                "{}: has no signal \"{}\", which drives the model; it has {there}; name the column in [columns]",
-                path.display(),
+                "{name}: has no signal \"{}\", which drives the model; it has {there}; name the column in [columns]",
                 input.name
             )));
         }

@@ -4,20 +4,23 @@ from typing import Any
 __version__: str
 
 Progress = Callable[[str, int, int | None], Any] | None
+Columns = list[tuple[str, Any]]
+Recordings = list[str] | dict[str, Any]
 
 class Answer:
     code: int
     json: str
     text: str
     files: list[tuple[str, str]]
-    tables: list[tuple[str, list[tuple[str, bytes]]]]
+    tables: list[tuple[str, list[tuple[str, bytearray]]]]
     html: str | None
     notes: list[str]
     error: str | None
     raised: BaseException | None
 
+def command_line(arguments: list[str], command: list[str]) -> int: ...
 def diagnose(
-    set: list[str],
+    set: Recordings,
     *,
     model: str | None,
     grip: str | None,
@@ -32,7 +35,7 @@ def diagnose(
 ) -> Answer: ...
 def fit(
     model: str,
-    set: list[str],
+    set: Recordings,
     *,
     grip: str | None,
     ignore_signal: list[str],
@@ -42,7 +45,7 @@ def fit(
 ) -> Answer: ...
 def simulate(
     model: str,
-    drive: str,
+    drive: str | dict[str, Any],
     out: str,
     *,
     grip: str | None,
@@ -50,7 +53,6 @@ def simulate(
     rate: float | None,
     substeps: int | None,
     noise: int | None,
-    columns: str | None,
     progress: Progress,
 ) -> Answer: ...
 def stability(
@@ -80,10 +82,23 @@ def compare(
     progress: Progress,
 ) -> Answer: ...
 def why(recording: str, *, roles: Any, progress: Progress) -> Answer: ...
-def inspect(files: list[str], *, rate: float | None, columns: list[str] | None, time: str | None, progress: Progress) -> Answer: ...
-def run(arguments: list[str], progress: Progress = None) -> tuple[int, str, list[str], str | None]: ...
-def write_table(path: str, names: list[str], columns: list[bytes]) -> None: ...
-def read_table(path: str) -> tuple[list[str], list[bytes]]: ...
+def inspect(recordings: list[Any], *, rate: float | None, columns: list[str] | None, time: str | None, progress: Progress) -> Answer: ...
+def export(
+    model: str,
+    to: str,
+    *,
+    language: str | None,
+    width: float | None,
+    step: float | None,
+    on: Recordings | None,
+    out: Any,
+    overwrite: bool,
+    progress: Progress,
+) -> Answer: ...
+def describe(model: str, *, grip: str | None, amplitude: float | None, progress: Progress) -> Answer: ...
+def load_bag(path: str, *, topics: list[str] | None, progress: Progress) -> Answer: ...
+def save_bag(recording: str | tuple[str, Columns], path: str, *, map: list[tuple[str, str]], overwrite: bool, progress: Progress) -> Answer: ...
+def write_table(path: str, columns: Columns) -> None: ...
 def patched(text: str, path: str, values: list[float], list: bool) -> str: ...
 def anywhere(text: str, folder: Any) -> str: ...
 def value_at(text: str, name: str, folder: Any, path: str | None) -> list[float]: ...

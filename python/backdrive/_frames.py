@@ -27,8 +27,8 @@ def is_frame(value: Any) -> bool:
     return isinstance(value, Mapping) and bool(value) and not any(is_path(v) or is_frame(v) for v in value.values())
 
 
-def columns_of(frame: Any, name: str) -> dict[str, bytes]:
-    """The columns of numbers as doubles. Of a column of something else nothing is taken: it is missing then, and who needs it says so."""
+def columns_of(frame: Any, name: str) -> dict[str, Any]:
+    """The columns of numbers as arrays of doubles. Of a column of something else nothing is taken: it is missing then, and who needs it says so."""
     import numpy
 
     if getattr(getattr(frame, "dtype", None), "names", None):
@@ -40,7 +40,7 @@ def columns_of(frame: Any, name: str) -> dict[str, bytes]:
         index = getattr(frame, "index", None)  # pandas: a clock may stand there
         if "t" not in frame.columns and (getattr(index, "name", None) == "t" or getattr(getattr(index, "dtype", None), "kind", "") in ("m", "M")):
             pairs.insert(0, ("t", index))
-    out: dict[str, bytes] = {}
+    out: dict[str, Any] = {}
     rows = None
     for heading, column in pairs:
         if str(getattr(column, "dtype", "")).startswith("datetime64"):  # with a time zone too
@@ -61,7 +61,7 @@ def columns_of(frame: Any, name: str) -> dict[str, bytes]:
         if rows is not None and len(values) != rows[1]:
             raise InputError(f"{name}: {heading}: has {len(values)} samples, \"{rows[0]}\" has {rows[1]}")
         rows = rows or (heading, len(values))
-        out[str(heading)] = numpy.ascontiguousarray(values, dtype="<f8").tobytes()
+        out[str(heading)] = numpy.ascontiguousarray(values, dtype=float)
     if not out:
         raise InputError(f"{name}: has no columns of numbers; a recording is a frame or a dictionary with a column t (s) and one for each signal")
     return out
@@ -77,20 +77,14 @@ def seconds(values: Any) -> Any:
 
 def write(frame: Any, path: str, name: str) -> None:
     """Writes a recording as CSV, to the last bit."""
-    columns = columns_of(frame, name)
-    _backdrive.write_table(path, list(columns), list(columns.values()))
+    _backdrive.write_table(path, list(columns_of(frame, name).items()))
 
 
-def read(path: str, kind: str = "auto") -> Any:
-    """Reads a table of numbers as a frame of a kind; `auto` is pandas where it is installed, else a dictionary of arrays."""
-    return of_bytes(zip(*_backdrive.read_table(path)), kind)
-
-
-def of_bytes(columns: Iterable[tuple[str, bytes]], kind: str) -> Any:
-    """Columns, each the bytes of doubles, as a frame of a kind."""
+def of_bytes(columns: Iterable[tuple[str, bytearray]], kind: str) -> Any:
+    """Columns, each the bytes of doubles, as a frame of a kind; `auto` is pandas where it is installed, else a dictionary of arrays."""
     import numpy
 
-    return of_kind({name: numpy.frombuffer(column, dtype="<f8").copy() for name, column in columns}, kind)
+    return of_kind({name: numpy.frombuffer(column, dtype="<f8") for name, column in columns}, kind)
 
 
 def of_kind(arrays: dict[str, Any], kind: str) -> Any:

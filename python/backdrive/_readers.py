@@ -277,8 +277,6 @@ def load_rosbag(path: str | os.PathLike[str], *, topics: str | Iterable[str] | N
 
 def save(frame: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Writes a recording as .csv, .parquet, .mat or .mcap, by the ending of the path; what is read back is the same to the last bit."""
-    import numpy
-
     from ._frames import columns_of, write
 
     name, suffix = os.fspath(path), os.path.splitext(os.fspath(path))[1].lower()
@@ -292,7 +290,7 @@ def save(frame: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -
 
         save_bag(frame, name, overwrite=overwrite)
         return
-    columns = {heading: numpy.frombuffer(column, dtype="<f8") for heading, column in columns_of(frame, "recording").items()}
+    columns = columns_of(frame, "recording")
     if suffix == ".parquet":
         pyarrow, parquet = _module("pyarrow", "pyarrow"), _module("pyarrow.parquet", "pyarrow")
         parquet.write_table(pyarrow.table(columns), name)

@@ -1,4 +1,4 @@
-"""The verbs of the command line as functions: most call the function behind the verb, the rest the verb by its arguments."""
+"""The verbs of the command line as functions: each calls the typed function behind the verb."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from . import _backdrive, _frames, _toml
 from ._errors import UsageError
 from ._model import Model
 from ._results import Exported, Fit, Interrupted, Prediction, Report, Verdict, fields
-from ._work import INTERRUPTED, Progress, Work
+from ._work import INTERRUPTED, Progress, Work, stated
 
 Path = str | os.PathLike[str]
 
@@ -29,25 +29,6 @@ def _folder_of(model: Any) -> str | None:
     if isinstance(model, Model):
         return None if model._folder is None else os.fspath(model._folder)
     return None if model is None else os.path.dirname(os.path.abspath(os.fspath(model)))
-
-
-def _options(given: Mapping[str, Any]) -> list[str]:
-    """Options as arguments; `None` and `False` are none, a list is the option again and again."""
-    out: list[str] = []
-    for name, value in given.items():
-        flag = "--" + name.strip("_").replace("_", "-")
-        if value is True:
-            out.append(flag)
-        elif isinstance(value, (list, tuple)):
-            for one in value:
-                out += [flag, _text(one)]
-        elif value is not None and value is not False:
-            out += [flag, _text(value)]
-    return out
-
-
-def _text(value: Any) -> str:
-    return os.fspath(value) if _frames.is_path(value) else repr(float(value)) if isinstance(value, float) else str(value)
 
 
 def _some(value: str | Sequence[str]) -> list[str]:
@@ -182,20 +163,19 @@ def simulate(
     kind: what the predictions are given as: "pandas", "polars", "numpy" (a dictionary of arrays), or "auto".
     """
     with Work(progress) as work:
-        set_file = None if columns is None else work.text_file("columns.toml", _toml.document({"fit": [], "columns": columns}))
-        driven = work.file(drive, "recording")
-        several = os.path.isdir(driven) or driven.endswith(".toml")
+        driven = work.recording(drive, "recording")
+        several = isinstance(driven, str) and (os.path.isdir(driven) or driven.endswith(".toml"))
+        is_file = isinstance(driven, str) and driven.lower().endswith((".csv", ".mcap"))
         answer = work.answer(
             _backdrive.simulate,
             _model_file(work, model),
-            driven,
+            stated([driven], [], {"columns": columns} if columns else {}) if columns and is_file or not isinstance(driven, str) else driven,
             "predicted" if several else "predicted.csv",
             grip=_grip(work, grip),
             input=input,
             rate=rate,
             substeps=substeps,
             noise=noise,
-            columns=set_file,
         )
         text = work.without_folder(answer.json)
         tables = dict(answer.tables)
@@ -287,7 +267,7 @@ def inspect(recordings: Any, *, rate: float | None = None, columns: Sequence[str
     rate: rows per second of tables in which no column is the time, Hz. columns: headings of tables that have none. time: the column with the times.
     """
     with Work(progress) as work:
-        given = work.files(recordings, "recording")
+        given = work.recordings(recordings, "recording")
         return _report(work, work.answer(_backdrive.inspect, given, rate=rate, columns=_list(columns), time=time))
 
 
@@ -309,17 +289,15 @@ def load_bag(path: Path, *, topics: str | Sequence[str] = (), kind: str = "auto"
     kind: "pandas", "polars", "numpy" (a dictionary of arrays), or "auto": pandas where it is installed. topics: only these.
     """
     with Work(False) as work:
-        table = work.path("bag.csv")
-        work.run(["bag", "export", os.fspath(path), "--csv", table, *_options({"topic": _some(topics)})])
-        return _frames.read(table, kind)
+        answer = work.answer(_backdrive.load_bag, os.fspath(path), topics=_some(topics) or None)
+        return _frames.of_bytes(dict(answer.tables)["bag"], kind)
 
 
 def save_bag(frame: Any, path: Path, *, map: Mapping[str, str] | None = None, overwrite: bool = False) -> None:
     """Writes a recording as a bag (MCAP). map: which column is what, `{"motor_position": "/master/measured_js.position[0]"}`."""
     with Work(False) as work:
-        maps = [f"{column}={place}" for column, place in (map or {}).items()]
-        table = work.file(frame, "recording")
-        work.run(["bag", "import", table, "--bag", os.fspath(path), *_options({"map": maps, "overwrite": overwrite})])
+        given = work.recording(frame, "recording")
+        work.answer(_backdrive.save_bag, given, os.fspath(path), map=list((map or {}).items()), overwrite=overwrite)
 
 
 def export(
@@ -339,19 +317,24 @@ def export(
     makes. What the form cannot hold is in `left_out`.
     """
     with Work(False) as work:
-        where = os.fspath(out) if out is not None else work.path("exported")
-        arguments = ["export", _model_file(work, model), "--to", to, "--out", where, "--json", *_options({"overwrite": overwrite, "on": work.files(on, "on")})]
-        arguments += _options({"language": language, "width": width, "step": step})
-        text = work.run(arguments)
-        with open(where, encoding="utf-8") as file:
-            return Exported(text, work.notes, work.code, file.read())
+        answer = work.answer(
+            _backdrive.export,
+            _model_file(work, model),
+            to,
+            language=language,
+            width=width,
+            step=step,
+            on=None if on is None else work.set(on, None, {}),
+            out=out,
+            overwrite=overwrite,
+        )
+        return Exported(work.without_folder(answer.json), work.notes, work.code, answer.text)
 
 
 def described(model: Model, grip: Any, amplitude: float | None) -> Any:
     """What `backdrive model show` prints about a model."""
     with Work(False) as work:
-        text = work.run(["model", "show", _model_file(work, model), "--json", *_options({"grip": _grip(work, grip), "amplitude": amplitude})])
-        return fields(text)
+        return fields(work.answer(_backdrive.describe, _model_file(work, model), grip=_grip(work, grip), amplitude=amplitude).json)
 
 
 __all__ = ["INTERRUPTED", "compare", "described", "diagnose", "export", "fit", "load_bag", "save_bag", "simulate", "stability", "why"]

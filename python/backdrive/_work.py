@@ -16,6 +16,7 @@ from ._errors import UsageError, raised
 from ._readers import numbers_of
 
 INTERRUPTED = 130
+Frame = tuple[str, list[tuple[str, Any]]]  # a recording in memory: its name, and its columns with their headings
 Progress = bool | Callable[[str, int, int | None], None]
 
 
@@ -60,12 +61,13 @@ class Bar:
 
 
 class Work:
-    """A folder of its own, in which frames become files, for as long as a verb works."""
+    """One call of a verb, with a folder for what it is given as text, such as a changed model."""
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress
         self.notes: list[str] = []
         self.code = 0
+        self.names: set[str] = set()
 
     def __enter__(self) -> Work:
         self.temporary = tempfile.TemporaryDirectory(prefix="backdrive-", ignore_cleanup_errors=True)
@@ -82,21 +84,11 @@ class Work:
         """A text without the path of the temporary folder."""
         return text.replace(self.folder + os.sep, "").replace(self.folder, "the recordings")
 
-    def from_here(self, path: str) -> str:
-        """A path as the set names it: files of ours by their name, others whole."""
-        return os.path.basename(path) if os.path.dirname(path) == self.folder else os.path.abspath(path)
-
     def text_file(self, name: str, text: str) -> str:
         path = self.path(name)
         with open(path, "w", encoding="utf-8") as file:
             file.write(text)
         return path
-
-    def run(self, arguments: Sequence[str]) -> str:
-        """Calls the verb; what it prints."""
-        code, result, notes, error = self._watched(lambda progress: _backdrive.run(list(arguments), progress))
-        self._ended(code, notes, error)
-        return self.without_folder(result)
 
     def asked(self, verb: Callable[..., Any], *given: Any, **options: Any) -> Any:
         """Calls a function behind a verb; its answer. What was raised while it worked is in there."""
@@ -126,43 +118,54 @@ class Work:
         if error is not None and code != INTERRUPTED:
             raise raised(self.without_folder(error), code)
 
-    def file(self, given: Any, name: str) -> str:
-        """One recording as a path."""
+    def recording(self, given: Any, name: str) -> str | Frame:
+        """One recording: a path, or its name and its columns."""
         if _frames.is_path(given):
             numbers = numbers_of(os.fspath(given))
             if numbers is None:
                 return os.fspath(given)
             given, name = numbers, os.path.splitext(os.path.basename(given))[0]
-        shown = re.sub(r"[^\w.\-]+", "-", name).strip("-.") or "recording"
-        path = self.path(shown + ".csv")
-        if os.path.exists(path):
-            raise UsageError(f"two recordings are called {shown}; give each a name of its own", 2)
-        _frames.write(given, path, name)
-        return path
+        shown = (re.sub(r"[^\w.\-]+", "-", name).strip("-.") or "recording") + ".csv"
+        if shown in self.names:
+            raise UsageError(f"two recordings are called {shown.removesuffix('.csv')}; give each a name of its own", 2)
+        self.names.add(shown)
+        return shown, list(_frames.columns_of(given, name).items())
 
-    def files(self, given: Any, name: str) -> list[str]:
-        """Recordings as paths: one, a sequence of them, or a dictionary of them by name."""
+    def recordings(self, given: Any, name: str) -> list[str | Frame]:
+        """One, a sequence of them, or a dictionary of them by name."""
         if given is None:
             return []
         if _frames.is_path(given) or _frames.is_frame(given):
-            return [self.file(given, name)]
+            return [self.recording(given, name)]
         if isinstance(given, Mapping):
-            return [self.file(one, str(key)) for key, one in given.items()]
+            return [self.recording(one, str(key)) for key, one in given.items()]
         if isinstance(given, Sequence):
-            return [self.file(one, f"{name}-{number}") for number, one in enumerate(given, 1)]
+            return [self.recording(one, f"{name}-{number}") for number, one in enumerate(given, 1)]
         raise UsageError(f"{type(given).__name__} is no recording: expected a path, a frame, a dictionary of arrays, or several of these", 2)
 
-    def set(self, recordings: Any, held_out: Any, settings: Mapping[str, Any]) -> list[str]:
-        """Recordings as arguments of a verb: paths unchanged where nothing else is stated, else a set that states it."""
+    def file(self, given: Any, name: str) -> str:
+        """One recording as a path; columns go into the folder."""
+        one = self.recording(given, name)
+        if isinstance(one, str):
+            return one
+        path = self.path(one[0])
+        _backdrive.write_table(path, one[1])
+        return path
+
+    def set(self, recordings: Any, held_out: Any, settings: Mapping[str, Any]) -> list[str] | dict[str, Any]:
+        """Recordings of a verb: paths unchanged where nothing else is stated, else a set with its frames."""
         settings = {k: v for k, v in settings.items() if v}
-        fit = self.files(recordings, "recording")
-        if held_out is None and not settings and not any(os.path.dirname(f) == self.folder for f in fit):
-            return fit
-        if len(fit) == 1 and (os.path.isdir(fit[0]) or fit[0].endswith(".toml")):
-            raise UsageError(f"{fit[0]}: a set states what is held out and how its columns are named; write it there, or give its files", 2)
-        held = self.files(held_out, "held-out")
-        if held_out is None and len(fit) > 1:
-            held = [fit.pop()]
-        names = {"fit": [self.from_here(f) for f in fit], "held_out": [self.from_here(f) for f in held]}
-        text = _toml.document({**names, **settings})
-        return [self.text_file("recordings.toml", text)]
+        fit = self.recordings(recordings, "recording")
+        paths = [one for one in fit if isinstance(one, str)]
+        if held_out is None and not settings and len(paths) == len(fit):
+            return paths
+        if len(fit) == 1 and paths and (os.path.isdir(paths[0]) or paths[0].endswith(".toml")):
+            raise UsageError(f"{paths[0]}: a set states what is held out and how its columns are named; write it there, or give its files", 2)
+        return stated(fit, self.recordings(held_out, "held-out"), settings)
+
+
+def stated(fit: Sequence[str | Frame], held_out: Sequence[str | Frame], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """A set: what stands in its `set.toml`, and those of its recordings that are no files."""
+    names = [[os.path.abspath(one) if isinstance(one, str) else one[0] for one in some] for some in (fit, held_out)]
+    text = _toml.document({"fit": names[0], "held_out": names[1], **settings})
+    return {"settings": text, "frames": [one for one in (*fit, *held_out) if not isinstance(one, str)]}

@@ -1,37 +1,29 @@
-//! What the Python package `backdrive` is built on: verbs as typed functions, others called by their arguments, tables read and written exactly, model
-//! files edited.
+//! What the Python package `backdrive` is built on: the typed functions behind the verbs, tables written and model files edited.
 //!
 //! A verb works in a thread of its own, and the interpreter's lock is released: other Python threads go on, and Ctrl-C is heard while it works.
 
+mod answer;
+mod files;
+mod given;
 mod model;
 mod table;
 mod verbs;
 mod work;
 
-use backdrive::call::{Called, call};
-use pyo3::exceptions::PyRuntimeError;
+use backdrive::program::Called;
 use pyo3::prelude::*;
-use work::worked;
+use std::ffi::OsString;
 
-/// Runs a verb: `(exit code, standard output, notes, error or None)`. `progress(message, position, length or None)` is called now and then.
-///
-/// # Errors
-/// Any exception from a signal handler or `progress`, such as `KeyboardInterrupt`; the verb is then asked to stop.
+/// The command line with these arguments; `command` starts another process of it. Gives the exit code.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress = None))]
-fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> PyResult<(u8, String, Vec<String>, Option<String>)> {
-    let done = worked(py, progress.as_ref(), move |caller| call(&arguments, caller))?;
-    match (done.result, done.raised) {
-        (Some(Called { code, result, notes, error }), None) => Ok((code, result, notes, error)),
-        (_, Some(raised)) => Err(raised),
-        (None, None) => Err(PyRuntimeError::new_err("the verb gave nothing")),
-    }
+fn command_line(py: Python<'_>, arguments: Vec<OsString>, command: Vec<String>) -> u8 {
+    py.detach(|| backdrive::main_as(Called { arguments, command }))
 }
 
 #[pymodule]
 fn _backdrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(command_line, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::diagnose_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::fit_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::simulate_typed, module)?)?;
@@ -39,8 +31,11 @@ fn _backdrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(verbs::compare_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::why_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::inspect_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(files::export_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(files::describe_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(files::load_bag_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(files::save_bag_typed, module)?)?;
     module.add_function(wrap_pyfunction!(table::write_table, module)?)?;
-    module.add_function(wrap_pyfunction!(table::read_table, module)?)?;
     module.add_function(wrap_pyfunction!(model::patched, module)?)?;
     module.add_function(wrap_pyfunction!(model::anywhere, module)?)?;
     module.add_function(wrap_pyfunction!(model::without, module)?)?;

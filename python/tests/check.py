@@ -306,6 +306,20 @@ class Package(unittest.TestCase):
         with self.assertRaises(backdrive.UsageError):
             backdrive.Model.from_mujoco(theirs)
 
+    def test_the_package_brings_the_whole_command_line(self):
+        def called(*arguments):
+            environment = {**os.environ, "PYTHONPATH": PLACE}
+            return subprocess.run([sys.executable, "-m", "backdrive", *map(str, arguments)], capture_output=True, text=True, cwd=self.folder, env=environment)
+
+        said = called("fit", "model.toml", "set.toml", "--json")
+        self.assertEqual(said.stdout, self.program("fit", "model.toml", "set.toml", "--json"))
+        self.assertEqual(said.returncode, 1, "the records disagree: a spring without its friction fits none of them")
+        self.assertEqual((called("fit", "absent.toml", "set.toml").returncode, called("fit", "--what").returncode), (3, 2))
+        # Each node of a run is a process of the same command.
+        said = called("run", ROOT / "launch/push-and-hold.toml", "--duration", 0.2, "--bag", "processes.mcap")
+        self.assertTrue((self.folder / "processes.mcap").is_file(), said.stderr)
+        self.assertEqual(called("bag", "info", "processes.mcap", "--check").returncode, 0)
+
     def test_other_threads_go_on(self):
         counted, over = [0], threading.Event()
 

@@ -12,6 +12,11 @@ pub trait Watch {
         Box::new(())
     }
 
+    /// Program and first arguments of a node's process; empty for the program of this process.
+    fn node_command(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// `done` of `all` steps of the run of this title are done. The run has ended where both are equal.
     fn steps(&self, _title: &str, _done: u64, _all: u64) {}
 }

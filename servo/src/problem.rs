@@ -6,7 +6,7 @@ use crate::record::Record;
 use backdrive_bags::{Reader, recording};
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::units::{Kind, split};
-use backdrive_plant::recording::{ColumnRule, Columns, JointColumns, Recording, Source, read_csv, read_headings};
+use backdrive_plant::recording::{ColumnRule, Columns, JointColumns, Recording, Source};
 use backdrive_plant::servo::Numbers;
 use backdrive_plant::set::RecordingSet;
 use rayon::prelude::*;
@@ -44,18 +44,18 @@ pub fn is_servo(set: &RecordingSet) -> bool {
         return set.joints.iter().any(|j| j.has_command) && set.joints.iter().all(|j| !j.has_torque);
     }
     let Some(first) = set.fit.iter().chain(&set.held_out).next() else { return false };
-    let Ok(headings) = names_in(&set.path_of(first)) else { return false };
+    let Ok(headings) = names_in(set, first) else { return false };
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let ends = |ends: &[&str]| plain.iter().any(|h| ends.iter().any(|e| h.ends_with(e)));
     !pairs(&plain).is_empty() && !ends(&[".torque", ".effort", "_torque", "_effort", ".tau"])
 }
 
 /// Headings of a table, or of what was a table before it became a bag.
-fn names_in(path: &Path) -> Result<Vec<String>, ServoError> {
-    if !is_bag(path) {
-        return Ok(read_headings(path)?);
+fn names_in(set: &RecordingSet, file: &str) -> Result<Vec<String>, ServoError> {
+    if !set.is_bag(file) {
+        return Ok(set.table(file).headings()?);
     }
-    let reader = Reader::open_begun(path)?;
+    let reader = Reader::open_begun(&set.path_of(file))?;
     Ok(reader.topics().iter().filter_map(|t| t.name.strip_prefix("/recording/").map(str::to_string)).collect())
 }
 
@@ -161,7 +161,7 @@ fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
         return Ok(set.joints.clone());
     }
     let first = set.fit.iter().chain(&set.held_out).next().cloned().unwrap_or_default();
-    let headings = names_in(&set.path_of(&first))?;
+    let headings = names_in(set, &first)?;
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let mut columns = Columns::new();
     let joints =
@@ -174,17 +174,13 @@ fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
     Ok(joints)
 }
 
-fn is_bag(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-}
-
 fn read_file(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Result<Recording, ServoError> {
     let signals: Vec<String> = joints.iter().flat_map(|j| [j.command(), j.position()]).collect();
     let names: Vec<&str> = signals.iter().map(String::as_str).collect();
-    let (path, piece) = (set.path_of(file), set.rules_of(file).piece);
-    let recording = match is_bag(&path) {
-        false => read_csv(&path, Some(&names), &set.columns, &piece)?,
-        true => recording(&Reader::open(&path)?, Some(&names), &set.columns, &piece, &|_| Hold::Zero)?,
+    let piece = set.rules_of(file).piece;
+    let recording = match set.is_bag(file) {
+        false => set.table(file).read(Some(&names), &set.columns, &piece)?,
+        true => recording(&Reader::open(&set.path_of(file))?, Some(&names), &set.columns, &piece, &|_| Hold::Zero)?,
     };
     let odd =
         recording.units.iter().find(|(name, unit)| names.contains(&name.as_str()) && !matches!(unit.kind, Kind::Angle | Kind::Length));

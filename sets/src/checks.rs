@@ -4,7 +4,7 @@ use crate::error::SetError;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_plant::model::Model;
-use backdrive_plant::recording::{Source, read_headings, signals_of, units};
+use backdrive_plant::recording::{Source, TableSource, signals_of, units};
 use backdrive_plant::set::RecordingSet;
 use std::io::Read;
 use std::path::Path;
@@ -14,9 +14,9 @@ pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
     let mut notes = Vec::new();
     let all: Vec<(&String, bool)> = set.fit.iter().map(|f| (f, false)).chain(set.held_out.iter().map(|f| (f, true))).collect();
     for (i, (second, held)) in all.iter().enumerate() {
-        let same = |first: &String| overlap(set, first, second) && same_data(&set.path_of(first), &set.path_of(second));
+        let same = |first: &String| overlap(set, first, second) && same_recording(&set.table(first), &set.table(second));
         let Some((first, first_held)) = all[..i].iter().find(|(first, _)| same(first)) else { continue };
-        let (first, second) = (set.path_of(first).display().to_string(), set.path_of(second).display().to_string());
+        let (first, second) = (set.table(first).name(), set.table(second).name());
         let which =
             if first == second { format!("{second}: is given twice") } else { format!("{second}: is the same recording as {first}") };
         if held != first_held {
@@ -55,6 +55,15 @@ fn overlap(set: &RecordingSet, first: &str, second: &str) -> bool {
     from_a < to_b && from_b < to_a && a.keep == b.keep
 }
 
+/// Whether two recordings are one, or hold the same. One in memory and one in a file are compared by what the model takes of them.
+fn same_recording(first: &TableSource, second: &TableSource) -> bool {
+    match (first, second) {
+        (TableSource::File(first), TableSource::File(second)) => same_data(first, second),
+        (TableSource::Frame(first), TableSource::Frame(second)) => first.is_same_data(second),
+        _ => false,
+    }
+}
+
 /// Whether two paths lead to one file, or to files of the same bytes. What cannot be read is reported where it is used.
 pub(crate) fn same_data(first: &Path, second: &Path) -> bool {
     if is_same_file(first, second) {
@@ -79,7 +88,7 @@ pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], ha
     for file in set.fit.iter().chain(&set.held_out) {
         for name in unused_in(set, file, model) {
             if !unused.iter().any(|(other, _)| *other == name) {
-                unused.push((name, set.path_of(file).display().to_string()));
+                unused.push((name, set.table(file).name()));
             }
         }
     }
@@ -112,18 +121,17 @@ fn is_hand(name: &str) -> bool {
 
 /// Signals of one file that are neither the model's nor named by the set. None of a file that cannot be read: another check reports that.
 fn unused_in(set: &RecordingSet, file: &str, model: &Model) -> Vec<String> {
-    let path = set.path_of(file);
     let own = signals_of(model);
     let by_rule = |heading: &str| set.columns.iter().any(|(_, rule)| matches!(&rule.source, Source::Column(c) if c == heading));
     let topic_by_rule =
         |name: &str| set.columns.iter().any(|(_, rule)| matches!(&rule.source, Source::Topic { topic, .. } if topic == name));
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-        let Ok(reader) = Reader::open(&path) else { return Vec::new() };
+    if set.is_bag(file) {
+        let Ok(reader) = Reader::open(&set.path_of(file)) else { return Vec::new() };
         let flat: Vec<String> = own.iter().map(|s| s.replace('.', "_")).collect();
         let names = reader.topics().iter().filter(|t| !topic_by_rule(&t.name)).filter_map(|t| t.name.strip_prefix("/recording/"));
         return names.filter(|n| !own.contains(n) && !flat.iter().any(|f| f == n)).map(str::to_string).collect();
     }
-    let Ok(headings) = read_headings(&path) else { return Vec::new() };
+    let Ok(headings) = set.table(file).headings() else { return Vec::new() };
     let rows_by = set.rules_of(file).piece.keep;
     let is_own = |h: &str| {
         // A heading is meant by its whole text or by its name without the unit.

@@ -6,5 +6,7 @@ mod error;
 pub mod experiments;
 pub mod init;
 pub mod open;
+mod recordings;
 
 pub use error::SetError;
+pub use recordings::Recordings;

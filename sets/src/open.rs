@@ -2,6 +2,7 @@
 
 use crate::checks;
 use crate::error::SetError;
+use crate::recordings::Recordings;
 use backdrive_bags::{Account, Reader, import_command, recover_command};
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::recordings::problem::{MOST_OF_A_BAG, Problem, ProblemError};
@@ -28,19 +29,19 @@ pub struct Opened {
 /// # Errors
 /// When a file is missing or wrong, a recording is fitted and held out at once, an input that was recorded has no place in the model, or the
 /// recordings cannot be fitted.
-pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, SetError> {
+pub fn open(recordings: &Recordings, model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, SetError> {
     let grip = grip.filter(|g| *g != Path::new("none"));
     let mut notes = Vec::new();
-    let (mut set, told) = set_of(paths)?;
+    let (mut set, told) = set_of(recordings)?;
     if model.is_none() && set.model.is_none() {
-        let first = paths.first().map_or(String::new(), |p| p.display().to_string());
+        let first = recordings.first();
         return Err(SetError::new(format!(
             "{first}: no model is named; give one with --model MODEL.toml, or a set.toml with model = \"...\""
         )));
     }
     hold_out(&mut set, told, &mut notes);
     notes.extend(checks::repeated(&set)?);
-    notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.path_of(file))));
+    notes.extend(set.paths().iter().filter_map(|path| unfinished(path)));
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| begun(&set, file)));
     let problem = match grip {
         None => Problem::of_set(&set, model),
@@ -60,20 +61,19 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     }
     audit::usable(&problem).map_err(SetError::new)?;
     let inputs = [model.map(Path::to_path_buf).or_else(|| set.model.clone()), grip.map(Path::to_path_buf)];
-    let files = inputs.into_iter().flatten().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-    Ok(Opened { problem, name: name_of(paths), notes, files })
+    let files = inputs.into_iter().flatten().chain(set.paths()).collect();
+    Ok(Opened { problem, name: recordings.name(), notes, files })
 }
 
-/// The set or the recording, for titles.
-pub fn name_of(paths: &[PathBuf]) -> String {
-    paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()))
-}
-
-/// The set that paths name, and whether it states itself what is fitted.
+/// The set of these recordings, and whether its file states what is fitted.
 ///
 /// # Errors
 /// When a file or folder is not there, or the set cannot be read.
-pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), SetError> {
+pub fn set_of(recordings: &Recordings) -> Result<(RecordingSet, bool), SetError> {
+    let paths = match recordings {
+        Recordings::Files(paths) => paths.as_slice(),
+        Recordings::Set(set) => return Ok((set.as_ref().clone(), false)),
+    };
     match paths {
         [one] if is_recording(one) => Ok((of_files(paths)?, false)),
         [one] => {
@@ -149,10 +149,10 @@ fn unfinished(path: &Path) -> Option<String> {
 
 /// What to know of a bag that is longer than what is read of it.
 fn begun(set: &RecordingSet, file: &str) -> Option<String> {
-    let path = set.path_of(file);
-    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) || set.rules_of(file).piece.rows.is_some() {
+    if !set.is_bag(file) || set.rules_of(file).piece.rows.is_some() {
         return None;
     }
+    let path = set.path_of(file);
     let longest = backdrive_bags::info(&path).ok()?.topics.iter().map(|topic| topic.messages).max().unwrap_or(0);
     (longest > MOST_OF_A_BAG as u64).then(|| {
         let of = format!("{}: of {longest} samples of a signal the first {MOST_OF_A_BAG} are read", path.display());

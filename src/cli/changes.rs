@@ -1,6 +1,7 @@
 //! Changes to a graph, which several verbs take.
 
 use super::values::{choices, law, not_negative, positive, rate};
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{Hand, Limits, Overrides, Sensors};
 use backdrive_nodes::stage::Clock;
 use clap::Args;
@@ -114,7 +115,7 @@ pub struct Changes {
     /// Coupling law between master and slave. It replaces the law of the graph's coupling, or its scaling; see
     /// docs/couplings.md.
     #[arg(long, value_name = "LAW", value_parser = law())]
-    pub coupling: Option<String>,
+    pub coupling: Option<LawKind>,
     /// Position scale from master to slave.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub mu: Option<f64>,
@@ -161,7 +162,7 @@ impl Changes {
         Overrides {
             mu: self.mu,
             lambda: self.lambda,
-            coupling: self.coupling.clone(),
+            coupling: self.coupling,
             dither: self.dither.clone(),
             guard: self.guard.then_some(true),
             bag: self.bag.clone(),

@@ -3,6 +3,7 @@
 use super::changes::SwappedParts;
 use super::values::{number, positive, rival};
 use crate::compare::links;
+use backdrive_stability::compare::Rival;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -23,7 +24,7 @@ pub struct Compare {
     pub session: PathBuf,
     /// Laws to compare. `canceller` is the law direct with a canceller; if the graph's canceller subtracts nothing, it uses the exact master model.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = rival())]
-    pub laws: Vec<String>,
+    pub laws: Vec<Rival>,
     /// Delays of the link, ms each way.
     #[arg(long, value_name = "MS", value_delimiter = ',', value_parser = delay, default_values_t = links::DELAYS_MS)]
     pub delays: Vec<f64>,

@@ -2,6 +2,7 @@
 
 use super::changes::SwappedParts;
 use super::values::{law, positive};
+use backdrive_control::coupling::LawKind;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -44,7 +45,7 @@ pub struct Stability {
     pub roles: Option<PathBuf>,
     /// Coupling law to judge, instead of the bag's scaling or coupling law; see docs/couplings.md.
     #[arg(long, value_name = "LAW", value_parser = law())]
-    pub coupling: Option<String>,
+    pub coupling: Option<LawKind>,
     /// Write the report as one HTML file.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

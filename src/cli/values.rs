@@ -1,6 +1,6 @@
 //! Values of options: numbers within their bounds.
 
-use backdrive_control::coupling::Law;
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::MAX_RATE_HZ;
 use backdrive_stability::compare::Rival;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -41,13 +41,24 @@ pub fn choices<T: Clone + Send + Sync + 'static, const N: usize>(
 }
 
 /// A law of a coupling.
-pub fn law() -> PossibleValuesParser {
-    PossibleValuesParser::new(Law::ALL.map(|(name, _)| name))
+pub fn law() -> impl TypedValueParser<Value = LawKind> {
+    words(&LawKind::ALL)
 }
 
 /// What is compared: a law of a coupling, or the canceller.
-pub fn rival() -> PossibleValuesParser {
-    PossibleValuesParser::new(Rival::all().into_iter().map(Rival::word))
+pub fn rival() -> impl TypedValueParser<Value = Rival> {
+    words(&Rival::all())
+}
+
+/// Values of an option: the word, and what it means.
+fn words<T: Clone + Send + Sync + 'static>(all: &[(&'static str, T)]) -> impl TypedValueParser<Value = T> + use<T> {
+    let values: Vec<&'static str> = all.iter().map(|(word, _)| *word).collect();
+    let all = all.to_vec();
+    let meaning = move |given: String| {
+        let found = all.iter().find(|(word, _)| *word == given);
+        found.map(|(_, value)| value.clone()).ok_or("is none of them")
+    };
+    PossibleValuesParser::new(values).try_map(meaning)
 }
 
 /// Steps per second.

@@ -7,7 +7,6 @@ use crate::{cli, output, progress};
 use backdrive_inspect::{Options, Recording, Report, Source, inspect_with_data};
 use backdrive_pages::inspect::page;
 use serde_json::{Value, json};
-use std::path::PathBuf;
 
 /// Inspects, and prints what was found.
 pub fn inspect(options: &cli::Inspect) -> Result<u8, Failure> {
@@ -15,7 +14,8 @@ pub fn inspect(options: &cli::Inspect) -> Result<u8, Failure> {
         output::writable(html)?;
     }
     let columns = Some(options.columns.clone()).filter(|columns| !columns.is_empty());
-    let found = inspected(&options.files, &Options { rate_hz: options.rate, columns, time: options.time.clone() })?;
+    let sources: Vec<Source> = options.files.iter().cloned().map(Source::Path).collect();
+    let found = inspected(&sources, &Options { rate_hz: options.rate, columns, time: options.time.clone() })?;
     if options.json {
         output::json(&found.json()?)?;
     } else {
@@ -38,9 +38,8 @@ pub struct Inspected {
 ///
 /// # Errors
 /// One cannot be read.
-pub fn inspected(files: &[PathBuf], options: &Options) -> Result<Inspected, Failure> {
-    let sources: Vec<Source> = files.iter().cloned().map(Source::Path).collect();
-    let (report, recordings) = progress::busy("inspecting", || inspect_with_data(&sources, options))?;
+pub fn inspected(sources: &[Source], options: &Options) -> Result<Inspected, Failure> {
+    let (report, recordings) = progress::busy("inspecting", || inspect_with_data(sources, options))?;
     Ok(Inspected { report, recordings })
 }
 

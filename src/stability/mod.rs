@@ -141,7 +141,7 @@ fn resolved(asked: &cli::Stability) -> Options {
     Options {
         recording: asked.recording.clone(),
         roles: asked.roles.clone(),
-        changes: Overrides { coupling: asked.coupling.clone(), ..asked.parts.overrides() },
+        changes: Overrides { coupling: asked.coupling, ..asked.parts.overrides() },
         gain: asked.gain,
         mu: asked.mu,
         lambda: asked.lambda,

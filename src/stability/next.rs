@@ -66,7 +66,7 @@ fn at(found: &Answer, options: &Options, asked: Option<&Graph>, gain: f64, page:
     let lambda = plain(gain / found.gain.mu);
     if asked.is_some() && options.script.is_none() && options.roles.is_none() {
         let replay = Builder::verb("replay").reads(&options.recording).words(words_of(&options.changes));
-        let replay = options.changes.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law));
+        let replay = options.changes.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law.name()));
         let replay = options.mu.iter().fold(replay, |replay, mu| replay.option("--mu", mu));
         return replay.option("--lambda", lambda).option_writes("--html", Path::new(page)).build();
     }

@@ -50,7 +50,7 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
         effort: Some(ask.effort * context.longer),
         ..Options::default()
     };
-    let opened = open(&Asked { set: vec![set], options, ..Asked::default() }).map_err(Failure::from)?;
+    let opened = open(&Asked { set: set.as_path().into(), options, ..Asked::default() }).map_err(Failure::from)?;
     let answer = diagnose_into(opened, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
     match answer.found.device {
         Diagnosed::OneAxis(found) => Ok(*found),

@@ -232,3 +232,6 @@ pub fn reproduces(happening: &Happening, again: &Outcome, again_hz: Option<f64>)
         _ => false,
     }
 }
+
+#[cfg(test)]
+mod tests;

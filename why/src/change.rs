@@ -2,6 +2,7 @@
 
 use crate::coupled::couple;
 use crate::trial::Trial;
+use backdrive_control::coupling::LawKind;
 use backdrive_control::hand::HandSettings;
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_diagnosis::physics::physics_named;
@@ -90,8 +91,8 @@ pub enum Change {
     },
     /// Another law between master and slave, without a canceller.
     Coupling {
-        /// As `--coupling` takes it.
-        law: String,
+        /// Which.
+        law: LawKind,
     },
     /// Motors without limits of force and rate.
     StrongerMotor,
@@ -143,7 +144,7 @@ impl Change {
                 }
                 trial.distortions.retain(|d| d.step == 0.0 && d.noise == 0.0);
             }
-            Change::Coupling { law } => couple(&mut trial.graph, law),
+            Change::Coupling { law } => couple(&mut trial.graph, *law),
             Change::Damping { damping } => damped(&mut trial.graph, *damping),
             Change::FrictionCompensated { share } => {
                 for element in masters(&mut trial.graph).flat_map(|m| &mut m.elements).filter(|e| is_friction_to_ground(e)) {
@@ -211,6 +212,7 @@ impl std::fmt::Display for Change {
             }
             Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
             Change::Coupling { law } => {
+                let law = law.name();
                 write!(f, "couple master and slave by {} instead of scaling and canceller (--coupling {law})", law.replace('_', " "))
             }
             Change::FinerSensors => write!(f, "use a position sensor with a finer resolution"),

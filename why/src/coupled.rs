@@ -1,11 +1,12 @@
 //! A loop with another law between master and slave.
 
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{Connection, Files, Graph, NodeKind, Overrides, Settings};
 
 /// Lets `law` couple the master and the slave of a graph, instead of scaling and canceller. What delays and impairs the ways in this graph lies on the link
 /// then. A graph that cannot be read again, or has no scaling, stays unchanged.
-pub fn couple(graph: &mut Graph, law: &str) {
-    let changes = Overrides { coupling: Some(law.to_string()), ..Overrides::default() };
+pub fn couple(graph: &mut Graph, law: LawKind) {
+    let changes = Overrides { coupling: Some(law), ..Overrides::default() };
     let Ok(mut coupled) = Graph::from_text(&graph.text, &graph.path, &changes, &Files::Bag(&graph.files)) else { return };
     let way = |to: NodeKind, port: &str| -> Option<&Connection> {
         graph.connections.iter().find(|c| graph.nodes[c.to.0].kind == to && c.to.1 == port)

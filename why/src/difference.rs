@@ -63,3 +63,6 @@ pub fn delay(graph: &mut Graph, node: usize, difference: &Difference) {
         });
     }
 }
+
+#[cfg(test)]
+mod tests;

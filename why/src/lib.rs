@@ -13,6 +13,8 @@ pub mod device;
 pub mod difference;
 pub mod differences;
 pub mod faulty;
+#[cfg(test)]
+mod fixtures;
 pub mod foreign;
 pub mod happening;
 mod named;

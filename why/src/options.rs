@@ -59,8 +59,8 @@ fn of(change: &Change, named: &Named) -> Option<Vec<Word>> {
         }
         Change::HighPass { hz } => Some(words(&["--high-pass", &hz.to_string()])),
         Change::Rate { hz } => Some(words(&["--rate", &format!("{hz:.0}")])),
-        Change::Coupling { law } if named.canceller.is_some() => Some(words(&["--coupling", law, "--canceller", "none"])),
-        Change::Coupling { law } => Some(words(&["--coupling", law])),
+        Change::Coupling { law } if named.canceller.is_some() => Some(words(&["--coupling", law.name(), "--canceller", "none"])),
+        Change::Coupling { law } => Some(words(&["--coupling", law.name()])),
         Change::WayRepaired { .. }
         | Change::Delays { .. }
         | Change::SensorRepaired { .. }

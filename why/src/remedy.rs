@@ -6,6 +6,7 @@ use crate::change::{Change, is_friction_to_ground};
 use crate::options::Word;
 use crate::throw::Throw;
 use crate::trial::{Hand, Trial};
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::{Gain, ResimulateError, Run, RunOptions};
@@ -30,7 +31,7 @@ const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
 const COMPENSATED: f64 = 0.8;
 
 /// Laws that are tried instead of scaling.
-const COUPLINGS: [&str; 4] = ["wave", "passivity", "position_position", "virtual_coupling"];
+const COUPLINGS: [LawKind; 4] = [LawKind::Wave, LawKind::Passivity, LawKind::PositionPosition, LawKind::VirtualCoupling];
 
 /// Corner of a high-pass that is tried, Hz.
 const HIGH_PASS_HZ: f64 = 1.0;
@@ -214,7 +215,7 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
         all.extend([0.5, 0.25].map(|factor| (vec![Change::Delays { factor }], false)));
     }
     if graph.node_of(NodeKind::Scaling).is_some() {
-        all.extend(COUPLINGS.map(|law| (vec![Change::Coupling { law: law.to_string() }], false)));
+        all.extend(COUPLINGS.map(|law| (vec![Change::Coupling { law }], false)));
     }
     all.push((vec![Change::Rate { hz: 2.0 * graph.timing.rate_hz }], false));
     all.extend(DAMPING.map(|damping| (vec![Change::Damping { damping: damping * unit_of_damping(was) }], false)));
@@ -305,3 +306,6 @@ pub fn is_fine(trial: &Trial, hand: &Hand, gain: Gain, run: &Run, cancel: &Atomi
     Change::NoLimits.apply(&mut unlimited);
     Ok(unlimited.run(hand, gain, &RunOptions::default(), cancel)?.outcome.is_stable())
 }
+
+#[cfg(test)]
+mod tests;

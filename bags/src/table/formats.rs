@@ -2,13 +2,15 @@
 
 use super::csv_file::Missing;
 use super::mapping::{ImportOptions, ImportReport};
-use super::types::Table;
+use super::types::{Cells, Column, Table};
 use super::{csv_file, from_bag, mat_in, mat_out, npz_in, parquet_in, parquet_out, to_bag};
 use crate::memory::Memory;
+use crate::number_type::NumberType;
 use crate::{BagError, Reader};
 use backdrive_plant::input_file;
+use backdrive_plant::recording::Frame;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A format of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,6 +161,31 @@ pub fn export_table(reader: &Reader, out: &Path, format: TableFormat, topics: Op
         TableFormat::Mat => mat_out::write(&table, out)?,
     });
     Ok((table.rows() as u64, notes))
+}
+
+/// As [`import_table`], of columns in memory. Errors count rows from 1.
+///
+/// # Errors
+/// As of [`import_table`].
+pub fn import_frame(frame: Frame, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
+    let name = PathBuf::from(frame.name());
+    let columns = frame.into_columns().into_iter().map(|(name, values)| Column::new(name, values, NumberType::Double)).collect();
+    to_bag::write_bag(&name, &Table { columns, ..Table::default() }, bag, options)
+}
+
+/// What [`export_table`] writes, as columns in memory: numbers that no double holds are rounded.
+///
+/// # Errors
+/// A topic that is not there, no numbers, a damaged bag.
+pub fn frame_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<(String, Vec<f64>)>, BagError> {
+    let numbers = |cells: Cells, rows: usize| match cells {
+        Cells::Numbers(values, _) => values,
+        Cells::Large { values, .. } => values.into_iter().map(|value| value as f64).collect(),
+        Cells::Other(_) => vec![f64::NAN; rows],
+    };
+    let table = from_bag::table_of(reader, topics)?;
+    let rows = table.rows();
+    Ok(table.columns.into_iter().map(|column| (column.name, numbers(column.cells, rows))).collect())
 }
 
 /// As [`export_table`], as CSV; numbers have the shortest digits that read back to the same bits. Returns the rows.

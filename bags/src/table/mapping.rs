@@ -1,7 +1,9 @@
 //! Which column of a table goes where in a bag.
 
+use crate::BagError;
 use crate::memory::MOST_BYTES;
 use serde::Serialize;
+use std::str::FromStr;
 
 /// What a column is of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +45,37 @@ pub struct ColumnMap {
     pub scale: f64,
     /// Then added.
     pub offset: f64,
+}
+
+impl ColumnMap {
+    /// A column at a place such as `/master/servo_jf.effort[0]`, unscaled.
+    ///
+    /// # Errors
+    /// [`BagError::Option`] where that is no place.
+    pub fn at(column: &str, place: &str) -> Result<ColumnMap, BagError> {
+        let read = || {
+            let (topic, field) = place.rsplit_once('.')?;
+            let (field, axis) = field.strip_suffix(']')?.split_once('[')?;
+            let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.field() == field)?;
+            let (column, topic) = (column.to_owned(), topic.to_owned());
+            Some(ColumnMap { column, topic, quantity, axis: axis.parse().ok()?, scale: 1.0, offset: 0.0 })
+        };
+        read().ok_or_else(|| no_map(&format!("{column}={place}")))
+    }
+}
+
+fn no_map(text: &str) -> BagError {
+    BagError::Option(format!("--map \"{text}\": expected COLUMN=TOPIC.FIELD[AXIS], such as force=/master/servo_jf.effort[0]"))
+}
+
+impl FromStr for ColumnMap {
+    type Err = BagError;
+
+    /// `COLUMN=TOPIC.FIELD[AXIS]`
+    fn from_str(text: &str) -> Result<ColumnMap, BagError> {
+        let (column, place) = text.split_once('=').ok_or_else(|| no_map(text))?;
+        ColumnMap::at(column, place)
+    }
 }
 
 /// How a table becomes a bag.

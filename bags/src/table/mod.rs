@@ -22,7 +22,7 @@ pub use bag_columns::columns_of;
 pub(crate) use bag_columns::was_table;
 pub(crate) use csv_file::Missing;
 pub(crate) use formats::read_table;
-pub use formats::{TableFormat, export_csv, export_table, import_csv, import_table};
+pub use formats::{TableFormat, export_csv, export_table, frame_of, import_csv, import_frame, import_table};
 pub(crate) use from_bag::table_of;
 pub use mapping::{ColumnMap, ImportOptions, ImportReport, Quantity, topic_of};
 pub(crate) use to_bag::write_bag;

@@ -33,6 +33,8 @@ pub mod wave_line;
 
 pub use side::{Conditions, Far, Near, Own, Packet};
 
+use serde::Serialize;
+
 /// A law with its settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
@@ -50,27 +52,69 @@ pub enum Law {
     VirtualCoupling(virtual_coupling::Settings),
 }
 
-impl Law {
-    /// Names in graph files, with the law at its defaults.
-    pub const ALL: [(&'static str, Law); 6] = [
-        ("direct", Law::Direct),
-        ("wave", Law::Wave(wave::Settings::DEFAULT)),
-        ("passivity", Law::Passivity(passivity::Settings::DEFAULT)),
-        ("position_position", Law::PositionPosition(position_position::Settings::DEFAULT)),
-        ("four_channel", Law::FourChannel(four_channel::Settings::DEFAULT)),
-        ("virtual_coupling", Law::VirtualCoupling(virtual_coupling::Settings::DEFAULT)),
+/// Which law it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LawKind {
+    /// Position forward, measured force back.
+    Direct,
+    /// Wave variables.
+    Wave,
+    /// Passivity observer and controller at both ports.
+    Passivity,
+    /// Both positions are sent, a spring pulls them together.
+    PositionPosition,
+    /// Positions and forces both ways.
+    FourChannel,
+    /// Spring and damper in front of what is touched, damping at the master.
+    VirtualCoupling,
+}
+
+impl LawKind {
+    /// All of them with their names, in graph files and on the command line.
+    pub const ALL: [(&'static str, LawKind); 6] = [
+        ("direct", LawKind::Direct),
+        ("wave", LawKind::Wave),
+        ("passivity", LawKind::Passivity),
+        ("position_position", LawKind::PositionPosition),
+        ("four_channel", LawKind::FourChannel),
+        ("virtual_coupling", LawKind::VirtualCoupling),
     ];
 
     /// Its name in graph files.
-    pub fn name(&self) -> &'static str {
+    pub fn name(self) -> &'static str {
+        LawKind::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    /// The law at its defaults.
+    pub fn usual(self) -> Law {
         match self {
-            Law::Direct => "direct",
-            Law::Wave(_) => "wave",
-            Law::Passivity(_) => "passivity",
-            Law::PositionPosition(_) => "position_position",
-            Law::FourChannel(_) => "four_channel",
-            Law::VirtualCoupling(_) => "virtual_coupling",
+            LawKind::Direct => Law::Direct,
+            LawKind::Wave => Law::Wave(wave::Settings::DEFAULT),
+            LawKind::Passivity => Law::Passivity(passivity::Settings::DEFAULT),
+            LawKind::PositionPosition => Law::PositionPosition(position_position::Settings::DEFAULT),
+            LawKind::FourChannel => Law::FourChannel(four_channel::Settings::DEFAULT),
+            LawKind::VirtualCoupling => Law::VirtualCoupling(virtual_coupling::Settings::DEFAULT),
         }
+    }
+}
+
+impl Law {
+    /// Which law it is.
+    pub fn kind(&self) -> LawKind {
+        match self {
+            Law::Direct => LawKind::Direct,
+            Law::Wave(_) => LawKind::Wave,
+            Law::Passivity(_) => LawKind::Passivity,
+            Law::PositionPosition(_) => LawKind::PositionPosition,
+            Law::FourChannel(_) => LawKind::FourChannel,
+            Law::VirtualCoupling(_) => LawKind::VirtualCoupling,
+        }
+    }
+
+    /// Its name in graph files.
+    pub fn name(&self) -> &'static str {
+        self.kind().name()
     }
 
     /// Whether it needs to know the force of the hand on the master.

@@ -4,10 +4,9 @@ use crate::arms::error::ArmError;
 use backdrive_bags::{BagError, Reader, recording, topic_of};
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::units::{Kind, split};
-use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, Source, read_csv, read_headings};
+use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, Source};
 use backdrive_plant::robot::{Coordinate, JointKind, Payload};
 use backdrive_plant::set::RecordingSet;
-use std::path::Path;
 
 /// A log in SI units, joints in the order of the robot's coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +51,7 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
             })
             .collect();
     }
-    if is_bag(&set.path_of(first)) {
+    if set.is_bag(first) {
         let (one, all) = (names.first().copied().unwrap_or("NAME"), names.join(", "));
         return Err(ArmError::Log {
             log: first.to_string(),
@@ -62,7 +61,7 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
             ),
         });
     }
-    let headings = read_headings(&set.path_of(first))?;
+    let headings = set.table(first).headings()?;
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let mut found = Vec::new();
     let mut columns = Columns::new();
@@ -125,18 +124,13 @@ pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordin
     Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque, payload: None })
 }
 
-fn is_bag(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-}
-
 /// Reads the joints' signals of a file, CSV or bag; errors name the joint's key in the set.
 fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Result<Recording, ArmError> {
     let signals: Vec<(String, String)> = joints.iter().flat_map(keys_of).collect();
     let names: Vec<&str> = signals.iter().map(|(signal, _)| signal.as_str()).collect();
     let piece: Piece = set.rules_of(file).piece;
-    let path = set.path_of(file);
-    if !is_bag(&path) {
-        return Ok(read_csv(&path, Some(&names), &set.columns, &piece).map_err(|mut e| {
+    if !set.is_bag(file) {
+        return Ok(set.table(file).read(Some(&names), &set.columns, &piece).map_err(|mut e| {
             for (signal, key) in &signals {
                 e.key = e.key.replace(&format!("[columns] {signal}"), key);
                 e.message = e.message.replace(&format!("[columns] takes \"{signal}\""), &format!("{key} is taken"));
@@ -144,7 +138,7 @@ fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Resu
             e
         })?);
     }
-    let reader = Reader::open_begun(&path).map_err(|e| ArmError::Bag(e.to_string()))?;
+    let reader = Reader::open_begun(&set.path_of(file)).map_err(|e| ArmError::Bag(e.to_string()))?;
     recording(&reader, Some(&names), &set.columns, &piece, &|_| Hold::Linear).map_err(|e| {
         let of = |wanted: &str, part: Option<&str>| {
             let is_there = |signal: &str| {

@@ -10,14 +10,20 @@ use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 
 /// What the snippet is written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Language {
     /// C99.
+    #[default]
     C,
     /// Python 3.
     Python,
     /// Numbers and equations.
     Yaml,
+}
+
+impl Language {
+    /// Each with its word.
+    pub const ALL: [(&str, Language); 3] = [("c", Language::C), ("python", Language::Python), ("yaml", Language::Yaml)];
 }
 
 /// The snippet. `width` is that of the smooth sign tanh(dq/width), m/s or rad/s; `None` for 1 mm/s or 10 mrad/s, and at most a fifth of the speed within

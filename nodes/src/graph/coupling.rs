@@ -4,7 +4,7 @@
 
 use super::{Connection, Graph, NodeKind};
 use crate::stage::Impairment;
-use backdrive_control::coupling::{Conditions, Law, four_channel, passivity, position_position, virtual_coupling, wave};
+use backdrive_control::coupling::{Conditions, Law, LawKind, four_channel, passivity, position_position, virtual_coupling, wave};
 use backdrive_plant::elements::Range;
 use backdrive_plant::tomlfile::{FileError, Table};
 
@@ -13,14 +13,14 @@ const VELOCITY_HZ: f64 = 100.0;
 
 /// Reads `law`, `velocity_hz` and the laws' own tables: the law in force, and the corner of the velocities' low-pass, Hz.
 pub(super) fn read(table: &mut Table) -> Result<(Law, f64), FileError> {
-    let chosen = table.need_one_of("law", &Law::ALL)?;
+    let chosen = table.need_one_of("law", &LawKind::ALL)?;
     let velocity_hz = table.number_or("velocity_hz", Range::Positive, VELOCITY_HZ)?;
-    let mut law = chosen;
-    for (name, default) in Law::ALL {
+    let mut law = chosen.usual();
+    for (name, kind) in LawKind::ALL {
         let Some(mut keys) = table.table(name)? else { continue };
-        let read = settings(default, &mut keys)?;
+        let read = settings(kind.usual(), &mut keys)?;
         keys.finish()?;
-        if read.name() == chosen.name() {
+        if kind == chosen {
             law = read;
         }
     }

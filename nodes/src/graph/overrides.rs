@@ -6,6 +6,7 @@ use super::recorded::Recorded;
 use super::swap::put_coupling;
 use super::{Graph, NodeKind};
 use crate::stage::Clock;
+use backdrive_control::coupling::LawKind;
 use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value, value};
@@ -36,7 +37,7 @@ pub struct Overrides {
     /// Force scale.
     pub lambda: Option<f64>,
     /// Law of the coupling; where the graph has a scaling node, a coupling takes its place.
-    pub coupling: Option<String>,
+    pub coupling: Option<LawKind>,
     /// Dither on the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`.
     pub dither: Option<String>,
     /// Whether the guard watches.
@@ -93,8 +94,8 @@ impl Overrides {
         // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
         rename_programs(&mut doc, &|name| if name.contains('/') { full(name) } else { name.to_string() });
         self.write_top(&mut doc);
-        if let Some(law) = &self.coupling {
-            put_coupling(&mut doc, law, &name)?;
+        if let Some(law) = self.coupling {
+            put_coupling(&mut doc, law.name(), &name)?;
         }
         self.write_nodes(&mut doc, &here, &name)?;
         Ok(doc.to_string())

@@ -6,6 +6,7 @@ use crate::resimulate::recover::recorded_intents;
 use crate::session::Session;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
+use backdrive_control::coupling::LawKind;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use std::fmt::Display;
@@ -16,8 +17,8 @@ use std::path::PathBuf;
 pub struct Options {
     /// A graph file with an operator, or the bag of a run, whose hand is then played.
     pub session: PathBuf,
-    /// Words of what is compared ([`Rival::word`]); all where none is named.
-    pub laws: Vec<String>,
+    /// What is compared; all where none is named.
+    pub laws: Vec<Rival>,
     /// Changes to the graph, which name no coupling.
     pub changes: Overrides,
     /// What the link and the hand do.
@@ -47,9 +48,8 @@ impl Asked {
             true => Some(Reader::open_begun(path).map_err(wrong)?),
             false => None,
         };
-        let load = |coupling: Option<&str>| -> Result<Graph, AskedError> {
-            let coupling = coupling.map(str::to_string);
-            let changes = Overrides { coupling, ..options.changes.clone() };
+        let load = |law: LawKind| -> Result<Graph, AskedError> {
+            let changes = Overrides { coupling: Some(law), ..options.changes.clone() };
             match &bag {
                 Some(reader) => graph_of(reader, &changes).map_err(wrong),
                 None => Graph::load(path, &changes).map_err(wrong),
@@ -58,10 +58,10 @@ impl Asked {
         let intents = bag.as_ref().map(intents).transpose()?;
         let mut notes = Vec::new();
         let mut rivals = Vec::new();
-        let all = Rival::all();
-        let asked = |rival: &Rival| options.laws.is_empty() || options.laws.iter().any(|word| word == rival.word());
-        for rival in all.into_iter().filter(asked) {
-            let mut graph = load(Some(rival.law()))?;
+        let all = Rival::all().into_iter().map(|(_, rival)| rival);
+        let asked = |rival: &Rival| options.laws.is_empty() || options.laws.contains(rival);
+        for rival in all.filter(asked) {
+            let mut graph = load(rival.law())?;
             let node = graph.node_of(NodeKind::Canceller).is_some();
             if rival == Rival::Canceller && !node && options.laws.is_empty() {
                 notes.push("the graph has no canceller node, so the laws are compared without the canceller".to_string());
@@ -75,7 +75,7 @@ impl Asked {
                         and its grip"
                         .to_string(),
                 ),
-                (Rival::Law(0), true, false) => notes.push("the laws run without the graph's canceller".to_string()),
+                (Rival::Law(LawKind::Direct), true, false) => notes.push("the laws run without the graph's canceller".to_string()),
                 _ => {}
             }
             rivals.push((rival, graph));

@@ -1,7 +1,7 @@
 //! What stands between master and slave in a comparison.
 
 use crate::resimulate::ResimulateError;
-use backdrive_control::coupling::Law;
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 
 /// A rival: a law of a coupling, or plain scaling behind a canceller.
@@ -9,29 +9,29 @@ use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 pub enum Rival {
     /// The law direct on the motion that a canceller leaves.
     Canceller,
-    /// A law by its place in [`Law::ALL`], without a canceller.
-    Law(usize),
+    /// A law, without a canceller.
+    Law(LawKind),
 }
 
 impl Rival {
-    /// All of them, the canceller first.
-    pub fn all() -> Vec<Rival> {
-        std::iter::once(Rival::Canceller).chain((0..Law::ALL.len()).map(Rival::Law)).collect()
+    /// All of them with their words on the command line, the canceller first.
+    pub fn all() -> Vec<(&'static str, Rival)> {
+        std::iter::once(("canceller", Rival::Canceller)).chain(LawKind::ALL.map(|(name, law)| (name, Rival::Law(law)))).collect()
     }
 
     /// Its word on the command line.
     pub fn word(self) -> &'static str {
         match self {
             Rival::Canceller => "canceller",
-            Rival::Law(index) => Law::ALL.get(index).map_or("", |(name, _)| name),
+            Rival::Law(law) => law.name(),
         }
     }
 
     /// The law of the coupling.
-    pub fn law(self) -> &'static str {
+    pub fn law(self) -> LawKind {
         match self {
-            Rival::Canceller => Law::Direct.name(),
-            Rival::Law(_) => self.word(),
+            Rival::Canceller => LawKind::Direct,
+            Rival::Law(law) => law,
         }
     }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::session::{AxisSignals, Session};
+use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{Limits, NodeKind, Overrides, Settings};
 use std::path::Path;
 
@@ -73,7 +74,7 @@ fn jitter_is_about_its_mean_and_both_ways_differ() {
 fn a_canceller_that_subtracts_nothing_gets_to_know_the_master() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let graph = |file: &str| {
-        let changes = Overrides { coupling: Some("direct".into()), ..Overrides::default() };
+        let changes = Overrides { coupling: Some(LawKind::Direct), ..Overrides::default() };
         Graph::load(&root.join(file), &changes).unwrap()
     };
     let knows = |graph: &Graph| match &graph.node_of(NodeKind::Canceller).unwrap().settings {
@@ -85,7 +86,7 @@ fn a_canceller_that_subtracts_nothing_gets_to_know_the_master() {
     assert_eq!(knows(&with).as_deref(), Some("impulse-engine"));
     // A graph with scaling gets a coupling in its place.
     let mut without = graph("launch/contact.toml");
-    Rival::all()[1].settle(&mut without).unwrap();
+    Rival::Law(LawKind::Direct).settle(&mut without).unwrap();
     assert_eq!(knows(&without), None);
 }
 
@@ -95,13 +96,13 @@ fn a_comparison_ranks_what_is_known() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     // Without the motor's limit of force, which a canceller reaches before it oscillates.
     let limits = Some(Limits::Ignored);
-    let changes = Overrides { coupling: Some("direct".into()), limits, duration_s: Some(2.0), ..Overrides::default() };
+    let changes = Overrides { coupling: Some(LawKind::Direct), limits, duration_s: Some(2.0), ..Overrides::default() };
     let of = |rival: Rival| {
         let mut graph = Graph::load(&root.join("launch/coupling.toml"), &changes).unwrap();
         rival.settle(&mut graph).unwrap();
         (rival, graph)
     };
-    let direct = Rival::all().into_iter().find(|r| r.word() == "direct").unwrap();
+    let direct = Rival::Law(LawKind::Direct);
     let comparison = Comparison {
         rivals: vec![of(Rival::Canceller), of(direct)],
         conditions: vec![Condition::delay(0.0), Condition::delay(0.05)],

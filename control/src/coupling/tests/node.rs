@@ -1,6 +1,6 @@
 use crate::core::{Core, Events, Port, Tick};
 use crate::coupling::node::{FarNode, NearNode};
-use crate::coupling::{Conditions, Law};
+use crate::coupling::{Conditions, Law, LawKind};
 use crate::scaling::GainPlan;
 use backdrive_msgs::{Sample, flag};
 
@@ -71,7 +71,7 @@ fn a_slave_that_is_silent_is_reported_to_the_master() {
 
 #[test]
 fn before_the_first_packet_the_slave_stays() {
-    let mut far = FarNode::new(1, &Law::ALL[1].1, &CONDITIONS, 0.02);
+    let mut far = FarNode::new(1, &LawKind::Wave.usual(), &CONDITIONS, 0.02);
     let [command, back] = step(&mut far, 0, &[port(0, 0.004, 0.0, 0), Port::EMPTY]);
     assert_eq!(command.position[0], 0.004);
     assert!(back.position[0].is_nan());
@@ -81,7 +81,8 @@ fn before_the_first_packet_the_slave_stays() {
 
 #[test]
 fn what_is_no_number_harms_no_law() {
-    for (name, law) in Law::ALL {
+    for (name, kind) in LawKind::ALL {
+        let law = kind.usual();
         let mut near = NearNode::new(1, &law, plan(1.0, 0.5), &CONDITIONS, 100.0, 0.02);
         let mut far = FarNode::new(1, &law, &CONDITIONS, 0.02);
         for at in 0..50 {

@@ -31,21 +31,18 @@ pub(super) fn unknown_of(set: &RecordingSet, model: &Model) -> Result<Vec<Unknow
 
 /// Reads one file of a set onto a regular grid.
 pub(super) fn record(set: &RecordingSet, file: &str, model: &Model, unknown: &[Unknown]) -> Result<Record, ProblemError> {
-    let path = set.path_of(file);
     let rules = set.rules_of(file);
-    let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let recording = if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, set, &rules.piece)? };
+    let nobody_measured = |name: &str| set.unknown.iter().any(|(input, _)| input == name);
+    let recording = match set.is_bag(file) {
+        true => from_bag(&set.path_of(file), model, &set.columns, &rules.piece)?,
+        false => set.table(file).read_signals_of(model, &set.columns, &rules.piece, &nobody_measured)?,
+    };
     recording.check_units(model)?;
     // Pieces of one file have names of their own.
     let name = set.folder.join(file).display().to_string();
     let recording = Recording { name, ..recording };
     let unmeasured: Vec<usize> = unknown.iter().map(|u| u.input).collect();
     Record::without(&recording, model, rules.condition, &unmeasured)
-}
-
-fn from_csv(path: &Path, model: &Model, set: &RecordingSet, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
-    let nobody_measured = |name: &str| set.unknown.iter().any(|(input, _)| input == name);
-    Ok(backdrive_plant::recording::read_signals_of(path, model, &set.columns, piece, &nobody_measured)?)
 }
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
