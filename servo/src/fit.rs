@@ -3,6 +3,7 @@
 use crate::record::Record;
 use crate::simulate::simulate;
 use backdrive_plant::servo::{Number, Numbers};
+use backdrive_signal::statistics::rms;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -15,8 +16,8 @@ const BOUND: f64 = 2.0;
 pub struct Problem<'a> {
     /// The records.
     pub records: Vec<&'a Record>,
-    /// The error that counts as 1, rad.
-    pub scale: f64,
+    /// The error that counts as 1, of each record, rad.
+    pub scales: Vec<f64>,
     /// Which fold each block of a record belongs to; a record is cut into [`BLOCKS`].
     pub folds: Vec<[usize; BLOCKS]>,
     /// How many folds there are.
@@ -42,14 +43,27 @@ pub struct Fit {
 }
 
 impl<'a> Problem<'a> {
-    /// Records are left out whole where there are enough of them, else stretches of them.
+    /// Records are left out whole where there are enough of them, else stretches of them. `scale`: the first of every record, rad.
     pub fn new(records: Vec<&'a Record>, scale: f64) -> Problem<'a> {
         let whole = records.len() >= 4;
         let fold_count = if whole { records.len().min(5) } else { BLOCKS };
         let folds =
             (0..records.len()).map(|r| std::array::from_fn(|b| if whole { r % fold_count } else { (r + b) % fold_count })).collect();
         let substeps = records.iter().map(|r| substeps(r)).collect();
-        Problem { records, scale, folds, fold_count, substeps }
+        let scales = vec![scale; records.len()];
+        Problem { records, scales, folds, fold_count, substeps }
+    }
+
+    /// The scale of each record becomes the root mean square of its own error, at least `least` (rad); returns the mean change of the logarithms, without
+    /// sign.
+    ///
+    /// Large and fast motions leave larger errors than small and slow ones, because every law simplifies. With a common scale they alone decide a fit. For
+    /// errors whose deviation is unknown in each record, maximum likelihood minimises the sum of the logarithms of these deviations; this is one step of it.
+    pub fn rescale(&mut self, numbers: &Numbers, least: f64) -> f64 {
+        let new: Vec<f64> = self.errors(numbers).iter().map(|e| rms(e).max(least)).collect();
+        let change = new.iter().zip(&self.scales).map(|(new, old)| (new / old).ln().abs()).sum::<f64>() / new.len().max(1) as f64;
+        self.scales = new;
+        change
     }
 
     fn residuals(&self, numbers: &Numbers, without: Option<usize>) -> Vec<Vec<f64>> {
@@ -65,7 +79,7 @@ impl<'a> Problem<'a> {
                 let count = r.len().max(1);
                 for (i, (s, p)) in r.iter_mut().zip(&record.position).enumerate() {
                     let out = without.is_some_and(|w| fold[i * BLOCKS / count] == w);
-                    *s = if out { 0.0 } else { (*s - p) / self.scale };
+                    *s = if out { 0.0 } else { (*s - p) / self.scales[index] };
                 }
                 r
             })
@@ -85,7 +99,8 @@ impl<'a> Problem<'a> {
 
     /// Errors of free runs, rad, by record.
     pub fn errors(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
-        self.residuals(numbers, None).into_iter().map(|r| r.into_iter().map(|x| x * self.scale).collect()).collect()
+        let scaled = self.residuals(numbers, None).into_iter().zip(&self.scales);
+        scaled.map(|(r, scale)| r.into_iter().map(|x| x * scale).collect()).collect()
     }
 
     /// Fits the free parameters from a start on, in at most this number of steps; `without`: a fold that the fit does not see.
