@@ -3,6 +3,7 @@
 use backdrive_plant::elements::{Damper, Law};
 use backdrive_plant::model::{Model, OutputKind};
 use backdrive_plant::robot::{Robot, Tree};
+use backdrive_plant::servo::Number;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
@@ -68,6 +69,8 @@ pub enum Change {
     Gravity(Vector3<f64>),
     /// The motors do not hold the weight of the links.
     NotCompensated,
+    /// A servo's parameter has the value at which it does nothing.
+    NoServo(usize, Number),
 }
 
 impl Change {
@@ -92,6 +95,7 @@ impl Change {
             }),
             Change::Gravity(gravity) => of_the_robot(model, |robot| robot.gravity = *gravity),
             Change::NotCompensated => model.arm.iter_mut().for_each(|arm| arm.gravity_compensated = false),
+            Change::NoServo(servo, n) => set(&mut model.servos, *servo, |s| s.numbers[*n] = n.facts().nothing),
         }
     }
 }
