@@ -25,6 +25,9 @@ pub struct Problem<'a> {
     substeps: Vec<usize>,
 }
 
+/// Largest friction by load that a fit tries.
+const MOST_LOAD_FRICTION: f64 = 2.0;
+
 /// Steps of a fit without a fold, after the one by the derivatives of the whole.
 const LEFT_OUT: usize = 1;
 
@@ -107,7 +110,7 @@ impl<'a> Problem<'a> {
     pub fn fit(&self, free: &[Number], start: &Numbers, most: usize, without: Option<usize>) -> Fit {
         let mut numbers = *start;
         for n in free {
-            let [least, largest] = n.facts().range;
+            let [least, largest] = range(*n);
             numbers[*n] = numbers[*n].clamp(least, largest);
         }
         let mut residuals = self.residuals(&numbers, without);
@@ -200,7 +203,7 @@ impl<'a> Problem<'a> {
             .par_iter()
             .map(|n| {
                 let d = 0.02 * size(*n, numbers);
-                let d = if numbers[*n] + d > n.facts().range[1] { -d } else { d };
+                let d = if numbers[*n] + d > range(*n)[1] { -d } else { d };
                 let mut there = *numbers;
                 there[*n] += d;
                 let unit = size(*n, numbers) / d;
@@ -237,7 +240,7 @@ fn block(values: &[f64], b: usize) -> &[f64] {
 fn stepped(free: &[Number], numbers: &Numbers, step: &DVector<f64>, share: f64) -> Numbers {
     let mut trial = *numbers;
     for (n, s) in free.iter().zip(step.iter()) {
-        let [least, largest] = n.facts().range;
+        let [least, largest] = range(*n);
         trial[*n] = (trial[*n] - share * s * size(*n, numbers)).clamp(least, largest);
     }
     trial
@@ -270,7 +273,7 @@ fn solve(a: &DMatrix<f64>, g: &DVector<f64>, free: &[Number], numbers: &Numbers)
         let right = DVector::from_fn(kept.len(), |i, _| g[kept[i]]);
         let step = part.cholesky()?.solve(&right);
         let leaves = |k: usize| {
-            let [least, largest] = free[kept[k]].facts().range;
+            let [least, largest] = range(free[kept[k]]);
             let now = numbers[free[kept[k]]];
             (now <= least && step[k] > 0.0) || (now >= largest && step[k] < 0.0)
         };
@@ -284,6 +287,14 @@ fn solve(a: &DMatrix<f64>, g: &DVector<f64>, free: &[Number], numbers: &Numbers)
                 return Some(out);
             }
         }
+    }
+}
+
+/// Limits of a number in a fit: those of a model file, and of friction by load what gears have; a gear that blocks itself has a little more than 1.
+fn range(n: Number) -> [f64; 2] {
+    match n {
+        Number::LoadFriction => [0.0, MOST_LOAD_FRICTION],
+        _ => n.facts().range,
     }
 }
 

@@ -23,6 +23,8 @@ const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
 /// Errors up to this many resolutions of the position sensor are the sensor's own.
 const NOISE: f64 = 1.4;
+/// Two laws whose mean losses differ by less than this share do as much: the commoner one is taken.
+const ALIKE: f64 = 0.05;
 /// Scales of errors are renewed if their logarithms changed by this much on average.
 const RESCALED: f64 = 0.2;
 /// Effects that are also tried two at a time: neither alone need show.
@@ -385,7 +387,7 @@ impl Searcher<'_> {
             };
             // Of those that do as much the one that stands first in the list, the commoner law, is taken.
             let rank = |c: &Candidate| c.added.last().and_then(|n| ALL.iter().position(|p| p.name == *n)).unwrap_or(ALL.len());
-            let wins = taken.as_ref().is_none_or(|(other, most, _)| match (total(&candidate) / total(other)).ln().abs() < 0.05 {
+            let wins = taken.as_ref().is_none_or(|(other, most, _)| match (total(&candidate) / total(other)).ln().abs() < ALIKE {
                 true => rank(&candidate) < rank(other),
                 false => lowers > *most,
             });
@@ -410,7 +412,9 @@ impl Searcher<'_> {
                 let share = 1.0 - total(&best) / total(c);
                 if self.is_better(c, &best) { share } else { share.min(0.0) }
             };
-            let least = without.iter().filter(|(name, _)| !is_needed(name)).map(|(_, c)| (worth(c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
+            // Friction by load is more of dry friction: alone, times a small weight with a free phase, it would be friction that varies with the angle.
+            let is_kept = |name: &str| is_needed(name) || (name == "coulomb" && best.added.contains(&"load_friction"));
+            let least = without.iter().filter(|(name, _)| !is_kept(name)).map(|(_, c)| (worth(c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
             match least {
                 Some((share, candidate)) if share < LEAST => best = candidate.clone(),
                 _ => return (best, without),

@@ -93,3 +93,12 @@ fn what_mujoco_has_no_attribute_for_is_listed() {
     assert_eq!(kinds, ["delay", "friction_at_rest", "dead_band", "speed"]);
     assert!(exported.left_out.iter().all(backdrive_export::LeftOut::matters));
 }
+
+#[test]
+fn a_robot_without_a_known_gain_is_written_joint_by_joint() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), ARM).unwrap();
+    let exported = mjcf::export(&model(&WEIGHED.replace("gravity = 0.07", ""), folder.path()), None).unwrap();
+    assert!(exported.left_out.iter().any(|l| l.kind == "links"), "{:?}", exported.left_out);
+    assert!(exported.text.contains("biasprm=\"0.01 -1 0\"") && !exported.text.contains("upper"), "{}", exported.text);
+}

@@ -102,7 +102,9 @@ impl Scaled<'_> {
             "MuJoCo's dry friction has one level, which no load changes",
             "its level at the pose of the robot file",
         );
-        if !has_moment {
+        if has_moment {
+            leave(Number::Gravity, "the weight of the links is not written", "");
+        } else {
             let why = "a weight that the robot file does not contain has no known place among the links";
             leave(Number::MomentCos, why, "");
             leave(Number::MomentSin, why, "");
@@ -125,7 +127,7 @@ fn alone(model: &Model, integration: Integration) -> Exported {
         let (x, z) = (-cos / (mass * FREE_FALL), -sin / (mass * FREE_FALL));
         let own = 1e-3 * inertia;
         let armature = inertia - own - mass * (x * x + z * z);
-        let friction = joint.n(Number::Friction);
+        let friction = joint.n(Number::Friction) + joint.n(Number::LoadFriction) * cos.abs();
         let holds: String = integration.friction().iter().map(|(key, value)| format!(" {key}=\"{value}\"")).collect();
         bodies += &format!(
             "    <body name=\"{name}\" pos=\"0 {} 0\">\n      <joint name=\"{name}\" type=\"hinge\" axis=\"0 1 0\" limited=\"false\" armature=\"{}\" damping=\"{} {}\" \
@@ -153,7 +155,7 @@ fn alone(model: &Model, integration: Integration) -> Exported {
         number(-FREE_FALL),
     );
     let notes = vec![
-        "no torque scale is known without a robot, so every proportional gain is written as 1 N m/rad. For N m, multiply kp, gainprm, \
+        "no torque scale is known, so every proportional gain is written as 1 N m/rad. For N m, multiply kp, gainprm, \
             biasprm, forcerange, armature, damping, frictionloss, mass and inertia by the gain"
             .to_owned(),
     ];
@@ -165,10 +167,15 @@ fn on_robot(model: &Model, arm: &Arm, integration: Integration) -> Result<Export
     let mut notes = Vec::new();
     let known: Vec<f64> = model.servos.iter().map(|s| s.numbers[Number::Gravity]).filter(|g| *g > 0.0).map(f64::recip).collect();
     let Some(usual) = middle(known) else {
-        return Err(ExportError::new(
-            "no proportional gain is known in N m/rad, because no joint's [servo] has a gravity above 0. Record motions that change the \
-             weight at a joint, or export without [robot]",
-        ));
+        let mut exported = alone(model, integration);
+        let why = "no proportional gain is known in N m/rad, so servos and masses have no common scale";
+        let left = LeftOut::key(Part::Robot, &arm.robot.name, "links", why, None);
+        exported.left_out.push(left.replaced_by("each joint for itself"));
+        exported.notes.push(
+            "no joint's [servo] has a gravity above 0. Motions that change the weight at a joint, in a new diagnosis, determine its gain"
+                .to_owned(),
+        );
+        return Ok(exported);
     };
     let mut joined = model.clone();
     let links = arm.inertia_at_pose(model.bodies.len());
