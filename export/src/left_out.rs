@@ -71,6 +71,8 @@ pub enum Change {
     NotCompensated,
     /// A servo's parameter has the value at which it does nothing.
     NoServo(usize, Number),
+    /// A servo's parameter is greater by this.
+    MoreServo(usize, Number, f64),
 }
 
 impl Change {
@@ -95,6 +97,7 @@ impl Change {
             }),
             Change::Gravity(gravity) => of_the_robot(model, |robot| robot.gravity = *gravity),
             Change::NotCompensated => model.arm.iter_mut().for_each(|arm| arm.gravity_compensated = false),
+            Change::MoreServo(servo, n, by) => set(&mut model.servos, *servo, |s| s.numbers[*n] += by),
             Change::NoServo(servo, n) => set(&mut model.servos, *servo, |s| s.numbers[*n] = n.facts().nothing),
         }
     }

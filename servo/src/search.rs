@@ -28,12 +28,15 @@ const ALIKE: f64 = 0.05;
 /// Scales of errors are renewed if their logarithms changed by this much on average.
 const RESCALED: f64 = 0.2;
 /// Effects that are also tried two at a time: neither alone need show.
-const PAIRS: [[&str; 2]; 5] = [
+const PAIRS: [[&str; 2]; 8] = [
     ["speed_limit", "acceleration_limit"],
     ["gravity", "load_friction"],
     ["payload", "load_friction"],
     ["coulomb", "dead_band"],
     ["gravity", "gain"],
+    ["coulomb", "saturation"],
+    ["coulomb", "speed_limit"],
+    ["coulomb", "acceleration_limit"],
 ];
 
 /// A structure with its fit and its errors on what the fit has not seen.

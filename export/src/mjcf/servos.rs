@@ -14,7 +14,8 @@ use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::elements::{Coulomb, Damper, Law, QuadraticDrag};
 use backdrive_plant::model::{Element, Model};
 use backdrive_plant::robot::{Arm, JointKind};
-use backdrive_plant::servo::{Number, Numbers, ServoJoint};
+use backdrive_plant::servo::{Number, ServoJoint};
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 
 /// Time step, s: friction is of first order in it, and a joint that holds a load creeps in proportion to it.
@@ -23,6 +24,8 @@ const STEP: f64 = 5e-4;
 const OF_WEIGHT: f64 = 1e-2;
 /// m/s².
 const FREE_FALL: f64 = 9.81;
+/// A joint carries weight if its largest torque is more than this share of the arm's largest.
+const CARRIES: f64 = 0.05;
 /// Armature that is written at least, as a share of the servo's inertia.
 const LEAST_ARMATURE: f64 = 1e-3;
 
@@ -76,8 +79,15 @@ impl Scaled<'_> {
         text + " ctrllimited=\"false\"/>\n"
     }
 
-    /// What a joint of MuJoCo has no attribute for; `index`: of the servo in the model, `has_moment`: whether a weight is written for the moment.
-    fn left_out(&self, index: usize, has_moment: bool) -> Vec<LeftOut> {
+    /// Dry friction as MuJoCo gets it, rad. A dead band holds the joint in the same range of angles as friction does, and both leave the same error in motion.
+    /// `weight`: the load in rad.
+    fn friction(&self, weight: f64) -> f64 {
+        self.n(Number::Friction) + self.n(Number::DeadBand) + self.n(Number::LoadFriction) * weight
+    }
+
+    /// What a joint of MuJoCo has no attribute for; `index`: of the servo in the model, `has_moment`: whether a weight is written for the moment, `weight`: the
+    /// load in rad.
+    fn left_out(&self, index: usize, has_moment: bool, weight: f64) -> Vec<LeftOut> {
         let servo = self.servo;
         let mut out = Vec::new();
         let mut leave = |n: Number, why: &str, instead: &str| {
@@ -91,7 +101,7 @@ impl Scaled<'_> {
             leave(Number::Delay, "MuJoCo cannot act ahead of its command", "");
         }
         leave(Number::Stribeck, "MuJoCo's dry friction has one level, which does not fall with speed", "its level at speed");
-        leave(Number::DeadBand, "MuJoCo's position actuators have no dead band", "");
+        leave(Number::DeadBand, "MuJoCo's position actuators have no dead band", "dry friction of the same width");
         leave(Number::Play, "MuJoCo's position actuators have no play", "");
         leave(Number::Speed, "MuJoCo's actuators have no profile: limit the speed of the command", "");
         leave(Number::Acceleration, "MuJoCo's actuators have no profile: limit the acceleration of the command", "");
@@ -108,6 +118,14 @@ impl Scaled<'_> {
             let why = "a weight that the robot file does not contain has no known place among the links";
             leave(Number::MomentCos, why, "");
             leave(Number::MomentSin, why, "");
+        }
+        for left in &mut out {
+            let more = match left.kind.as_str() {
+                "dead_band" => servo.numbers[Number::DeadBand],
+                "load_friction" => servo.numbers[Number::LoadFriction] * weight,
+                _ => continue,
+            };
+            left.changes.push(Change::MoreServo(index, Number::Friction, more));
         }
         out
     }
@@ -127,7 +145,7 @@ fn alone(model: &Model, integration: Integration) -> Exported {
         let (x, z) = (-cos / (mass * FREE_FALL), -sin / (mass * FREE_FALL));
         let own = 1e-3 * inertia;
         let armature = inertia - own - mass * (x * x + z * z);
-        let friction = joint.n(Number::Friction) + joint.n(Number::LoadFriction) * cos.abs();
+        let friction = joint.friction(cos.hypot(sin));
         let holds: String = integration.friction().iter().map(|(key, value)| format!(" {key}=\"{value}\"")).collect();
         bodies += &format!(
             "    <body name=\"{name}\" pos=\"0 {} 0\">\n      <joint name=\"{name}\" type=\"hinge\" axis=\"0 1 0\" limited=\"false\" armature=\"{}\" damping=\"{} {}\" \
@@ -143,7 +161,7 @@ fn alone(model: &Model, integration: Integration) -> Exported {
             own = number(own),
         );
         actuators += &joint.actuator(integration);
-        left_out.extend(joint.left_out(index, true));
+        left_out.extend(joint.left_out(index, true, cos.hypot(sin)));
     }
     let text = format!(
         "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\"/>\n  <option timestep=\"{}\" integrator=\"{}\" gravity=\"0 0 {}\"/>\n  <worldbody>\n{bodies}  \
@@ -165,21 +183,20 @@ fn alone(model: &Model, integration: Integration) -> Exported {
 /// The robot with its links, and the servos at its joints.
 fn on_robot(model: &Model, arm: &Arm, integration: Integration) -> Result<Exported, ExportError> {
     let mut notes = Vec::new();
-    let known: Vec<f64> = model.servos.iter().map(|s| s.numbers[Number::Gravity]).filter(|g| *g > 0.0).map(f64::recip).collect();
-    let Some(usual) = middle(known) else {
+    let weights = weights(arm);
+    let Some(usual) = common_gain(model, arm, &weights) else {
         let mut exported = alone(model, integration);
-        let why = "no proportional gain is known in N m/rad, so servos and masses have no common scale";
+        let why = "the proportional gain of a joint with weight is not known in N m/rad, so servos and masses have no common scale";
         let left = LeftOut::key(Part::Robot, &arm.robot.name, "links", why, None);
         exported.left_out.push(left.replaced_by("each joint for itself"));
         exported.notes.push(
-            "no joint's [servo] has a gravity above 0. Motions that change the weight at a joint, in a new diagnosis, determine its gain"
+            "a joint that carries weight has no gravity above 0 in its [servo]. Motions that change this weight, in a new diagnosis, determine its gain"
                 .to_owned(),
         );
         return Ok(exported);
     };
     let mut joined = model.clone();
     let links = arm.inertia_at_pose(model.bodies.len());
-    let weights = weights(arm);
     let mut left_out = of_robot(model)?;
     let mut actuators = String::new();
     for (index, servo) in model.servos.iter().enumerate() {
@@ -195,8 +212,8 @@ fn on_robot(model: &Model, arm: &Arm, integration: Integration) -> Result<Export
             ));
         }
         let joint = Scaled { servo, gain };
-        let weight = weights.get(coordinate).copied().unwrap_or(0.0).abs();
-        add(&mut joined, body, &servo.joint, &servo.numbers, gain, weight);
+        let weight = weights.get(coordinate).copied().unwrap_or(0.0);
+        add(&mut joined, body, &joint, weight / gain);
         let inertia = gain * servo.numbers[Number::Inertia];
         let rest = inertia - links[(body, body)];
         if rest < LEAST_ARMATURE * inertia {
@@ -209,7 +226,7 @@ fn on_robot(model: &Model, arm: &Arm, integration: Integration) -> Result<Export
         }
         joined.bodies[body].inertia = rest.max(LEAST_ARMATURE * inertia);
         actuators += &joint.actuator(integration);
-        left_out.extend(joint.left_out(index, false));
+        left_out.extend(joint.left_out(index, false, weight / gain));
     }
     let layout = Layout::of(&joined);
     let (network, more) = network(&joined, &layout.pose, names_in(model, "tendon"));
@@ -225,28 +242,46 @@ fn on_robot(model: &Model, arm: &Arm, integration: Integration) -> Result<Export
 }
 
 /// Damping, drag and dry friction of a servo as elements of its joint.
-fn add(joined: &mut Model, body: usize, joint: &str, numbers: &Numbers, gain: f64, weight: f64) {
+fn add(joined: &mut Model, body: usize, joint: &Scaled, weight: f64) {
+    let name = &joint.servo.joint;
     let mut element = |what: &str, law: Law| {
-        joined.elements.push(Element { name: format!("{joint}_{what}"), between: [Some(body), None], law });
+        joined.elements.push(Element { name: format!("{name}_{what}"), between: [Some(body), None], law });
     };
-    element("damping", Law::Damper(Damper { damping: gain * numbers[Number::Damping] }));
-    let drag = gain * numbers[Number::QuadraticDamping];
+    element("damping", Law::Damper(Damper { damping: joint.gain * joint.n(Number::Damping) }));
+    let drag = joint.gain * joint.n(Number::QuadraticDamping);
     if drag > 0.0 {
         element("drag", Law::QuadraticDrag(QuadraticDrag { coefficient: drag }));
     }
-    let force = gain * numbers[Number::Friction] + numbers[Number::LoadFriction] * weight;
+    let force = joint.gain * joint.friction(weight);
     if force > 0.0 {
         element("friction", Law::Coulomb(Coulomb { force }));
     }
 }
 
-/// Torque of gravity at each coordinate at the pose, N m.
+/// The usual gain of joints that carry weight, N m/rad, if each of them has a known one: a weight that the servo model does not have would move the joint.
+fn common_gain(model: &Model, arm: &Arm, weights: &[f64]) -> Option<f64> {
+    let heaviest = weights.iter().copied().fold(0.0, f64::max);
+    let carries = |servo: &&ServoJoint| {
+        let coordinate = arm.tree.coordinates().iter().position(|c| c.name == servo.joint);
+        coordinate.is_some_and(|c| weights[c] > CARRIES * heaviest)
+    };
+    let gains: Vec<f64> = model.servos.iter().filter(carries).map(|s| s.numbers[Number::Gravity]).collect();
+    middle(gains.iter().map(|g| (*g > 0.0).then(|| g.recip())).collect::<Option<Vec<f64>>>()?)
+}
+
+/// Largest torque of gravity at each coordinate, N m, at the pose and with one coordinate a quarter turn from it.
 fn weights(arm: &Arm) -> Vec<f64> {
     let mut work = arm.tree.workspace();
-    let mut forces = vec![0.0; arm.tree.len()];
-    arm.tree.gravity(&arm.pose, &mut work, &mut forces);
-    let turns = arm.tree.coordinates().iter().map(|c| c.kind == JointKind::Revolute);
-    forces.into_iter().zip(turns).map(|(force, turns)| if turns { force } else { 0.0 }).collect()
+    let (mut forces, mut most) = (vec![0.0; arm.tree.len()], vec![0.0f64; arm.tree.len()]);
+    let turns = |c: usize| arm.tree.coordinates()[c].kind == JointKind::Revolute;
+    let moved = (0..arm.tree.len()).filter(|c| turns(*c)).flat_map(|c| [(c, FRAC_PI_2), (c, -FRAC_PI_2)]);
+    for (coordinate, by) in moved.chain([(0, 0.0)]) {
+        let mut pose = arm.pose.clone();
+        pose.iter_mut().skip(coordinate).take(1).for_each(|q| *q += by);
+        arm.tree.gravity(&pose, &mut work, &mut forces);
+        most.iter_mut().zip(&forces).for_each(|(most, force)| *most = most.max(force.abs()));
+    }
+    most
 }
 
 fn middle(mut all: Vec<f64>) -> Option<f64> {
