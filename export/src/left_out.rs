@@ -3,6 +3,7 @@
 use backdrive_plant::elements::{Damper, Law};
 use backdrive_plant::model::{Model, OutputKind};
 use backdrive_plant::robot::{Robot, Tree};
+use backdrive_plant::servo::Number;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
@@ -68,6 +69,10 @@ pub enum Change {
     Gravity(Vector3<f64>),
     /// The motors do not hold the weight of the links.
     NotCompensated,
+    /// A servo's parameter has the value at which it does nothing.
+    NoServo(usize, Number),
+    /// A servo's parameter is greater by this.
+    MoreServo(usize, Number, f64),
 }
 
 impl Change {
@@ -92,6 +97,8 @@ impl Change {
             }),
             Change::Gravity(gravity) => of_the_robot(model, |robot| robot.gravity = *gravity),
             Change::NotCompensated => model.arm.iter_mut().for_each(|arm| arm.gravity_compensated = false),
+            Change::MoreServo(servo, n, by) => set(&mut model.servos, *servo, |s| s.numbers[*n] += by),
+            Change::NoServo(servo, n) => set(&mut model.servos, *servo, |s| s.numbers[*n] = n.facts().nothing),
         }
     }
 }

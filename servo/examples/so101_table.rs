@@ -1,6 +1,7 @@
 //! Errors of free runs from the commands on recordings that were left out, joint by joint: `cargo run --release -p backdrive-servo --example so101_table -- SET MODEL`.
 //!
-//! Without a set that holds recordings out, each is simulated by a fit that has not seen it. The last line is the mean over the joints.
+//! Without a set that holds recordings out, each is simulated by a fit that has not seen it. The line `mean` is the mean over the joints. Below stand the
+//! nrmse of each recording and the effects found. A third argument names a file to which the diagnosed model is written.
 
 use backdrive_diagnosis::options::Options;
 use backdrive_plant::set::RecordingSet;
@@ -12,11 +13,15 @@ use std::time::Instant;
 
 fn main() -> ExitCode {
     let asked: Vec<String> = std::env::args().skip(1).collect();
-    let [set, model] = asked.as_slice() else {
-        eprintln!("expected SET MODEL: a set.toml with commands and positions, and a model file with the robot");
-        return ExitCode::from(2);
+    let (set, model, out) = match asked.as_slice() {
+        [set, model] => (set, model, None),
+        [set, model, out] => (set, model, Some(Path::new(out))),
+        _ => {
+            eprintln!("expected SET MODEL [OUT]: a set.toml with commands and positions, a model file with the robot, and a file to write");
+            return ExitCode::from(2);
+        }
     };
-    match table(Path::new(set), Path::new(model)) {
+    match table(Path::new(set), Path::new(model), out) {
         Ok(text) => {
             println!("{text}");
             ExitCode::SUCCESS
@@ -28,11 +33,14 @@ fn main() -> ExitCode {
     }
 }
 
-fn table(set: &Path, model: &Path) -> Result<String, String> {
+fn table(set: &Path, model: &Path, out: Option<&Path>) -> Result<String, String> {
     let began = Instant::now();
     let set = RecordingSet::open(set).map_err(|e| e.to_string())?;
     let problem = Problem::open(&set, Some(model)).map_err(|e| e.to_string())?;
     let found = diagnose(&problem, &Options::default(), None, &|_| ()).map_err(|e| e.to_string())?;
+    if let Some(out) = out {
+        std::fs::write(out, found.model.to_toml()).map_err(|e| format!("{}: {e}", out.display()))?;
+    }
     let servo = found.verdict.servo.ok_or("no joint was diagnosed")?;
     let mut lines = vec![format!("{:<16} {:>21} {:>21} {:>21}", "", "the command", "second order", "diagnosed")];
     lines.push(format!(
@@ -48,6 +56,9 @@ fn table(set: &Path, model: &Path) -> Result<String, String> {
         lines.push(row_of(&joint.joint, &row));
     }
     lines.push(row_of("mean", &sums));
+    for record in &found.verdict.held_out.per_record {
+        lines.push(format!("{:<30} {:<24} {:>8.4}", record.record, record.output, record.nrmse_after.unwrap_or(f64::NAN)));
+    }
     for answer in &found.answers {
         lines.push(format!("{}: {}", problem.joints[answer.joint].name, answer.found.best.added.join(", ")));
     }

@@ -374,7 +374,8 @@ fn finding(joint: &Joint, found: &JointSearch, claim: &Claim, gain: Option<&Esti
             (*name, ((1.0 - own) / own.max(1e-9)).clamp(DOUBT, 1.0))
         })
         .collect();
-    let all = 1.0 + rivals.iter().map(|r| r.1).sum::<f64>();
+    // Where no rival has a name, one without a name keeps the doubt.
+    let all = 1.0 + rivals.iter().map(|r| r.1).sum::<f64>().max(DOUBT);
     let there = claim.without.map_or(0.5, |g| sure(g.in_errors()).max(if g.is_sure() { 0.95 } else { 0.0 }));
     let mut parameters = BTreeMap::new();
     for n in named(claim.name).iter().flat_map(|p| p.numbers) {

@@ -3,6 +3,7 @@
 use crate::record::Record;
 use crate::simulate::simulate;
 use backdrive_plant::servo::{Number, Numbers};
+use backdrive_signal::statistics::rms;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -15,14 +16,17 @@ const BOUND: f64 = 2.0;
 pub struct Problem<'a> {
     /// The records.
     pub records: Vec<&'a Record>,
-    /// The error that counts as 1, rad.
-    pub scale: f64,
+    /// The error that counts as 1, of each record, rad.
+    pub scales: Vec<f64>,
     /// Which fold each block of a record belongs to; a record is cut into [`BLOCKS`].
     pub folds: Vec<[usize; BLOCKS]>,
     /// How many folds there are.
     pub fold_count: usize,
     substeps: Vec<usize>,
 }
+
+/// Largest friction by load that a fit tries.
+const MOST_LOAD_FRICTION: f64 = 2.0;
 
 /// Steps of a fit without a fold, after the one by the derivatives of the whole.
 const LEFT_OUT: usize = 1;
@@ -42,14 +46,27 @@ pub struct Fit {
 }
 
 impl<'a> Problem<'a> {
-    /// Records are left out whole where there are enough of them, else stretches of them.
+    /// Records are left out whole where there are enough of them, else stretches of them. `scale`: the first of every record, rad.
     pub fn new(records: Vec<&'a Record>, scale: f64) -> Problem<'a> {
         let whole = records.len() >= 4;
         let fold_count = if whole { records.len().min(5) } else { BLOCKS };
         let folds =
             (0..records.len()).map(|r| std::array::from_fn(|b| if whole { r % fold_count } else { (r + b) % fold_count })).collect();
         let substeps = records.iter().map(|r| substeps(r)).collect();
-        Problem { records, scale, folds, fold_count, substeps }
+        let scales = vec![scale; records.len()];
+        Problem { records, scales, folds, fold_count, substeps }
+    }
+
+    /// The scale of each record becomes the root mean square of its own error, at least `least` (rad); returns the mean change of the logarithms, without
+    /// sign.
+    ///
+    /// Large and fast motions leave larger errors than small and slow ones, because every law simplifies. With a common scale they alone decide a fit. For
+    /// errors whose deviation is unknown in each record, maximum likelihood minimises the sum of the logarithms of these deviations; this is one step of it.
+    pub fn rescale(&mut self, numbers: &Numbers, least: f64) -> f64 {
+        let new: Vec<f64> = self.errors(numbers).iter().map(|e| rms(e).max(least)).collect();
+        let change = new.iter().zip(&self.scales).map(|(new, old)| (new / old).ln().abs()).sum::<f64>() / new.len().max(1) as f64;
+        self.scales = new;
+        change
     }
 
     fn residuals(&self, numbers: &Numbers, without: Option<usize>) -> Vec<Vec<f64>> {
@@ -65,7 +82,7 @@ impl<'a> Problem<'a> {
                 let count = r.len().max(1);
                 for (i, (s, p)) in r.iter_mut().zip(&record.position).enumerate() {
                     let out = without.is_some_and(|w| fold[i * BLOCKS / count] == w);
-                    *s = if out { 0.0 } else { (*s - p) / self.scale };
+                    *s = if out { 0.0 } else { (*s - p) / self.scales[index] };
                 }
                 r
             })
@@ -85,14 +102,15 @@ impl<'a> Problem<'a> {
 
     /// Errors of free runs, rad, by record.
     pub fn errors(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
-        self.residuals(numbers, None).into_iter().map(|r| r.into_iter().map(|x| x * self.scale).collect()).collect()
+        let scaled = self.residuals(numbers, None).into_iter().zip(&self.scales);
+        scaled.map(|(r, scale)| r.into_iter().map(|x| x * scale).collect()).collect()
     }
 
     /// Fits the free parameters from a start on, in at most this number of steps; `without`: a fold that the fit does not see.
     pub fn fit(&self, free: &[Number], start: &Numbers, most: usize, without: Option<usize>) -> Fit {
         let mut numbers = *start;
         for n in free {
-            let [least, largest] = n.facts().range;
+            let [least, largest] = range(*n);
             numbers[*n] = numbers[*n].clamp(least, largest);
         }
         let mut residuals = self.residuals(&numbers, without);
@@ -185,7 +203,7 @@ impl<'a> Problem<'a> {
             .par_iter()
             .map(|n| {
                 let d = 0.02 * size(*n, numbers);
-                let d = if numbers[*n] + d > n.facts().range[1] { -d } else { d };
+                let d = if numbers[*n] + d > range(*n)[1] { -d } else { d };
                 let mut there = *numbers;
                 there[*n] += d;
                 let unit = size(*n, numbers) / d;
@@ -222,7 +240,7 @@ fn block(values: &[f64], b: usize) -> &[f64] {
 fn stepped(free: &[Number], numbers: &Numbers, step: &DVector<f64>, share: f64) -> Numbers {
     let mut trial = *numbers;
     for (n, s) in free.iter().zip(step.iter()) {
-        let [least, largest] = n.facts().range;
+        let [least, largest] = range(*n);
         trial[*n] = (trial[*n] - share * s * size(*n, numbers)).clamp(least, largest);
     }
     trial
@@ -255,7 +273,7 @@ fn solve(a: &DMatrix<f64>, g: &DVector<f64>, free: &[Number], numbers: &Numbers)
         let right = DVector::from_fn(kept.len(), |i, _| g[kept[i]]);
         let step = part.cholesky()?.solve(&right);
         let leaves = |k: usize| {
-            let [least, largest] = free[kept[k]].facts().range;
+            let [least, largest] = range(free[kept[k]]);
             let now = numbers[free[kept[k]]];
             (now <= least && step[k] > 0.0) || (now >= largest && step[k] < 0.0)
         };
@@ -269,6 +287,14 @@ fn solve(a: &DMatrix<f64>, g: &DVector<f64>, free: &[Number], numbers: &Numbers)
                 return Some(out);
             }
         }
+    }
+}
+
+/// Limits of a number in a fit: those of a model file, and of friction by load what gears have; a gear that blocks itself has a little more than 1.
+fn range(n: Number) -> [f64; 2] {
+    match n {
+        Number::LoadFriction => [0.0, MOST_LOAD_FRICTION],
+        _ => n.facts().range,
     }
 }
 

@@ -33,7 +33,13 @@ pub const BASE: [Number; 4] = [Number::Delay, Number::Inertia, Number::Damping, 
 /// All that are tried.
 pub const ALL: [Physics; 14] = [
     physics("coulomb", "dry friction", &[Number::Friction], &[], &["dead_band", "backlash", "load_friction"]),
-    physics("stribeck", "dry friction that is larger at rest", &[Number::Stribeck, Number::StribeckSpeed], &["coulomb"], &[]),
+    physics(
+        "stribeck",
+        "dry friction that is larger at rest",
+        &[Number::Stribeck, Number::StribeckSpeed],
+        &["coulomb"],
+        &["dead_band", "backlash"],
+    ),
     physics("load_friction", "friction that grows with the load", &[Number::LoadFriction], &["gravity", "payload"], &["coulomb"]),
     physics("dead_band", "a dead band of the servo", &[Number::DeadBand], &[], &["coulomb", "backlash"]),
     physics("backlash", "play", &[Number::Play], &[], &["coulomb", "dead_band"]),
@@ -51,7 +57,13 @@ pub const ALL: [Physics; 14] = [
     physics("acceleration_limit", "a limit of the acceleration", &[Number::Acceleration], &[], &["saturation", "speed_limit"]),
     physics("integral", "an integral term of the servo", &[Number::Integral], &[], &[]),
     physics("lead", "a derivative term on the command", &[Number::Lead], &[], &[]),
-    physics("quadratic_drag", "drag that grows with the square of the speed", &[Number::QuadraticDamping], &[], &[]),
+    physics(
+        "quadratic_drag",
+        "drag that grows with the square of the speed",
+        &[Number::QuadraticDamping],
+        &[],
+        &["speed_limit", "saturation"],
+    ),
 ];
 
 /// An effect by its name.

@@ -15,6 +15,9 @@ use backdrive_signal::statistics::{deviation, median};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Steps of the fit that shows how large the errors of each recording are.
+const FIRST: usize = 6;
+
 /// A joint that was fitted again.
 #[derive(Debug, Clone)]
 pub struct Refitted {
@@ -62,8 +65,12 @@ pub fn refit(problem: &Problem) -> Result<Fitted, ServoError> {
             let records: Vec<&Record> = joint.fit.iter().collect();
             let free: BTreeSet<Number> =
                 FACTS.iter().filter(|f| given[f.number] != f.nothing).map(|f| f.number).chain([Number::Inertia, Number::Damping]).collect();
-            let fits = Fits::new(records.clone(), sizes(&records).lag.max(floor(&records)));
-            let candidate = candidate_of(&fits, Vec::new(), &free.into_iter().collect::<Vec<_>>(), &given);
+            let free: Vec<Number> = free.into_iter().collect();
+            let resolution = floor(&records);
+            let mut fits = Fits::new(records.clone(), sizes(&records).lag.max(resolution));
+            let first = fits.fit(&free, &given, FIRST, None);
+            fits.rescale(&first.numbers, resolution.max(1e-9));
+            let candidate = candidate_of(&fits, Vec::new(), &free, &first.numbers);
             let judged = if joint.held_out.is_empty() { &joint.fit } else { &joint.held_out };
             let errors = |n: &Numbers| {
                 let moving = judged.iter().filter(|r| deviation(&r.position) > 1e-3);

@@ -7,7 +7,7 @@ use backdrive_diagnosis::belief::predictive::{Gain, gain};
 use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_plant::servo::{Number, Numbers};
-use backdrive_signal::statistics::{deviation, rms};
+use backdrive_signal::statistics::deviation;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -23,13 +23,20 @@ const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
 /// Errors up to this many resolutions of the position sensor are the sensor's own.
 const NOISE: f64 = 1.4;
+/// Two laws whose mean losses differ by less than this share do as much: the commoner one is taken.
+const ALIKE: f64 = 0.05;
+/// Scales of errors are renewed if their logarithms changed by this much on average.
+const RESCALED: f64 = 0.2;
 /// Effects that are also tried two at a time: neither alone need show.
-const PAIRS: [[&str; 2]; 5] = [
+const PAIRS: [[&str; 2]; 8] = [
     ["speed_limit", "acceleration_limit"],
     ["gravity", "load_friction"],
     ["payload", "load_friction"],
     ["coulomb", "dead_band"],
     ["gravity", "gain"],
+    ["coulomb", "saturation"],
+    ["coulomb", "speed_limit"],
+    ["coulomb", "acceleration_limit"],
 ];
 
 /// A structure with its fit and its errors on what the fit has not seen.
@@ -185,14 +192,12 @@ struct Searcher<'a> {
 }
 
 impl Searcher<'_> {
-    /// The scale of errors becomes that of a fit; whether it changed much.
+    /// The scale of each record's errors becomes that of a fit, where they changed much; whether they did.
     fn rescale(&mut self, numbers: &Numbers) -> bool {
-        let all: Vec<f64> = self.problem.errors(numbers).into_iter().flatten().collect();
-        let rms = rms(&all);
-        let scale = rms.max(self.floor).max(1e-9);
-        let changed = scale < 0.8 * self.problem.scale;
-        if changed || self.tried.is_empty() {
-            self.problem.scale = scale;
+        let before = self.problem.scales.clone();
+        let changed = self.problem.rescale(numbers, (NOISE * self.floor).max(1e-9)) > RESCALED;
+        if !changed && !self.tried.is_empty() {
+            self.problem.scales = before;
         }
         changed
     }
@@ -240,7 +245,10 @@ impl Searcher<'_> {
     }
 
     /// What is not worth it taken off, and how sure the rest is.
-    fn ended(&mut self, best: Candidate) -> (Candidate, Vec<Claim>) {
+    fn ended(&mut self, mut best: Candidate) -> (Candidate, Vec<Claim>) {
+        if self.rescale(&best.fit.numbers) {
+            best = self.candidate(best.added.clone(), &best.fit.numbers.clone());
+        }
         let (best, without) = self.simpler(best);
         let claims = without.iter().map(|(name, candidate)| self.claim(&best, name, candidate)).collect();
         (best, claims)
@@ -254,8 +262,9 @@ impl Searcher<'_> {
 
     /// How much better one predicts than another. Errors below what the sensor resolves are none.
     fn gain(&self, base: &Candidate, better: &Candidate) -> Option<Gain> {
-        let least = (0.3 * self.floor / self.problem.scale).powi(2) + 0.01;
-        let lists = |c: &Candidate| c.unseen.iter().map(|b| b.iter().map(|x| x + least).collect()).collect::<Vec<Vec<f64>>>();
+        let least = |scale: &f64| (0.3 * self.floor / scale).powi(2) + 0.01;
+        let by_record = |(b, scale): (&[f64; BLOCKS], &f64)| b.iter().map(|x| x + least(scale)).collect();
+        let lists = |c: &Candidate| c.unseen.iter().zip(&self.problem.scales).map(by_record).collect::<Vec<Vec<f64>>>();
         gain(&lists(base), &lists(better))
     }
 
@@ -273,7 +282,8 @@ impl Searcher<'_> {
     fn is_better(&self, base: &Candidate, better: &Candidate) -> bool {
         let lowers = 1.0 - total(better) / total(base);
         // Below what the sensor resolves there is nothing to explain.
-        let is_noise = total(base).sqrt() * self.problem.scale < NOISE * self.floor;
+        let squares = base.unseen.iter().zip(&self.problem.scales).map(|(b, scale)| mean(b) * scale * scale);
+        let is_noise = (squares.sum::<f64>() / self.problem.records.len().max(1) as f64).sqrt() < NOISE * self.floor;
         if !lowers.is_finite() || lowers < LEAST || is_noise {
             return false;
         }
@@ -281,7 +291,7 @@ impl Searcher<'_> {
             return true;
         }
         // An effect that shows in few recordings, such as a limit: what they gain is not lost in others, and no single one is all of it.
-        let by_record = |c: &Candidate| -> Vec<f64> { c.unseen.iter().map(|b| b.iter().sum::<f64>() / BLOCKS as f64).collect() };
+        let by_record = |c: &Candidate| -> Vec<f64> { c.unseen.iter().map(mean).collect() };
         let differences: Vec<f64> = by_record(base).iter().zip(by_record(better)).map(|(a, b)| a - b).collect();
         let gains: f64 = differences.iter().map(|d| d.max(0.0)).sum();
         let losses: f64 = differences.iter().map(|d| (-d).max(0.0)).sum();
@@ -380,7 +390,7 @@ impl Searcher<'_> {
             };
             // Of those that do as much the one that stands first in the list, the commoner law, is taken.
             let rank = |c: &Candidate| c.added.last().and_then(|n| ALL.iter().position(|p| p.name == *n)).unwrap_or(ALL.len());
-            let wins = taken.as_ref().is_none_or(|(other, most, _)| match (total(&candidate) / total(other)).ln().abs() < 0.05 {
+            let wins = taken.as_ref().is_none_or(|(other, most, _)| match (total(&candidate) / total(other)).ln().abs() < ALIKE {
                 true => rank(&candidate) < rank(other),
                 false => lowers > *most,
             });
@@ -405,7 +415,9 @@ impl Searcher<'_> {
                 let share = 1.0 - total(&best) / total(c);
                 if self.is_better(c, &best) { share } else { share.min(0.0) }
             };
-            let least = without.iter().filter(|(name, _)| !is_needed(name)).map(|(_, c)| (worth(c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
+            // Friction by load is more of dry friction: alone, times a small weight with a free phase, it would be friction that varies with the angle.
+            let is_kept = |name: &str| is_needed(name) || (name == "coulomb" && best.added.contains(&"load_friction"));
+            let least = without.iter().filter(|(name, _)| !is_kept(name)).map(|(_, c)| (worth(c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
             match least {
                 Some((share, candidate)) if share < LEAST => best = candidate.clone(),
                 _ => return (best, without),
@@ -454,6 +466,10 @@ fn screened(change: &Move) -> Vec<Number> {
     let own = change.adds.iter().flat_map(|p| p.numbers.iter().copied());
     let all: BTreeSet<Number> = own.chain([Number::Damping, Number::Offset, Number::Inertia]).collect();
     all.into_iter().collect()
+}
+
+fn mean(blocks: &[f64; BLOCKS]) -> f64 {
+    blocks.iter().sum::<f64>() / BLOCKS as f64
 }
 
 /// Mean loss on what the fits have not seen.

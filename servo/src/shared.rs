@@ -26,6 +26,13 @@ pub fn shared(found: &Found) -> Vec<SharedCause> {
                 frequency; a soft gear has a resonance peak",
         ));
     }
+    if found.claims.iter().any(|c| c.name == "lead") {
+        out.push(cause(
+            &["lead", "delay"],
+            "a derivative term on the command and a shorter delay both advance the response",
+            "command steps: a derivative term kicks at the step, a delay only shifts the response",
+        ));
+    }
     for claim in &found.claims {
         for (rival, _) in claim.rivals.iter().filter(|(_, gain)| gain.is_none_or(|g| g.in_errors() < APART)) {
             let (sentence, motion) = told(claim.name, rival);
@@ -76,6 +83,19 @@ fn told(one: &str, other: &str) -> (&'static str, &'static str) {
             "limits of torque, speed and acceleration all slow down large steps",
             "command steps of 0.1, 0.3 and 1 rad. A speed limit gives ramps of one slope, an acceleration limit gives slopes that grow \
                 with the step, a torque limit depends on the load",
+        );
+    }
+    if is("stribeck", "dead_band") || is("stribeck", "backlash") {
+        return (
+            "friction that is larger at rest, a dead band and play all hold the joint a little longer at a reversal",
+            "command ramps at four speeds under a steady load: the load closes the play, and only friction at rest makes the joint jump when \
+                it starts",
+        );
+    }
+    if is("quadratic_drag", "speed_limit") || is("quadratic_drag", "saturation") {
+        return (
+            "drag and a limit of speed or torque both hold back fast motions",
+            "command steps of 0.1, 0.3 and 1 rad: a limit gives ramps of one slope, drag rounds them",
         );
     }
     if is("coulomb", "stribeck") {

@@ -123,18 +123,18 @@ fn take_out(section: Node, model: &Model, layout: &Layout, edits: &mut Edits, no
     };
     let more_bodies = layout.in_robot.iter().any(Option::is_none);
     match name {
-        "actuator" if !model.inputs.is_empty() => {
+        "actuator" if !model.inputs.is_empty() || !model.servos.is_empty() => {
             edits.remove(section);
-            say("the actuators of the MJCF are replaced by the model's inputs");
+            say("the actuators of the MJCF are replaced by the model's own");
         }
-        "sensor" if !model.inputs.is_empty() || !model.outputs.is_empty() => {
+        "sensor" if !model.inputs.is_empty() || !model.servos.is_empty() || !model.outputs.is_empty() => {
             let of_ours = |sensor: &Node| sensor.attribute("name").is_some_and(|n| model.outputs.iter().any(|o| o.name == n));
             for sensor in section.children().filter(|n| n.attribute("actuator").is_some() || of_ours(n)) {
                 edits.remove(sensor);
                 say("sensors of the MJCF that read its actuators, or have the name of an output of the model, are removed");
             }
         }
-        "keyframe" if more_bodies || !model.inputs.is_empty() => {
+        "keyframe" if more_bodies || !model.inputs.is_empty() || !model.servos.is_empty() => {
             edits.remove(section);
             say("the key frames of the MJCF are removed: the model has other inputs or more bodies");
         }

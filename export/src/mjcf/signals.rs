@@ -95,7 +95,7 @@ fn force_limit(model: &Model, input: usize) -> Option<f64> {
 }
 
 /// Attributes of a delay; of one that is no whole number of steps it is the straight line between samples.
-fn delay(delay: f64, step: f64, whole: &str) -> String {
+pub(super) fn delay(delay: f64, step: f64, whole: &str) -> String {
     if delay <= 0.0 {
         return String::new();
     }
