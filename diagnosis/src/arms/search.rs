@@ -122,7 +122,7 @@ fn beside_least_squares(data: &mut Data, without: &[String], most: usize, limit:
     Ok(found)
 }
 
-/// Joints at which plain least squares predicts stretches that no fit has seen surely better than what was found: all inertial parameters free, and friction,
+/// Joints at which plain least squares predicts held-out segments surely better than what was found. It has all inertial parameters free, and friction,
 /// armature and a constant at every joint.
 fn behind_least_squares(data: &Data, without: &[String], found: &Search) -> Vec<usize> {
     let pool = pool(data, without);

@@ -1,5 +1,5 @@
-//! The lists outside this folder that have to name every effect. A new effect fails each of these tests by its name until that list has it, or says
-//! here why it does not.
+//! The lists outside this folder that have to name every effect. A new effect fails each of these tests by its name until that list has it, or an
+//! exception here states why not.
 
 use super::tests::{devices, hypotheses};
 use super::*;
