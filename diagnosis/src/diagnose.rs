@@ -75,6 +75,7 @@ pub fn diagnose(
     remarks.extend(contradicted);
     let (problem, search) = searched(problem, options, limit, report, &mut remarks)?;
     remarks.extend(search.forces.as_ref().map(of_band));
+    remarks.extend(search.forces.iter().flat_map(|forces| &forces.same_force).map(|text| of_same_force(text)));
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);
@@ -152,6 +153,11 @@ fn of_band(forces: &OnForces) -> Remark {
         forces.corner_hz
     );
     Remark { weight: Weight::Note, records: Vec::new(), signal: String::new(), about: "band", text }
+}
+
+/// That a law that was found is the same force as another one.
+fn of_same_force(text: &str) -> Remark {
+    Remark { weight: Weight::Caution, records: Vec::new(), signal: String::new(), about: "same_force", text: text.to_string() }
 }
 
 /// Searches by simulation of the whole model.

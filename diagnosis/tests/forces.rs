@@ -110,6 +110,24 @@ fn friction_and_a_ripple_are_named_from_forces_with_their_numbers() {
 }
 
 #[test]
+fn friction_beside_a_spring_of_unknown_zero_is_not_told_from_friction_by_direction() {
+    // 0.08 and 0.12 N m by direction are 0.1 N m and a constant of 0.02 N m, which is where the spring has its zero.
+    let by_direction = |v: f64| if v > 0.0 { 0.08 } else { -0.12 };
+    for constant in [0.0, 0.02] {
+        let verdict = said(move |[q, v, _]| by_direction(v) + constant + 0.5 * q, 0.02, 0.0, 1e-4);
+        assert!((number(&verdict, "coulomb", "force") - 0.1).abs() < 0.01);
+        assert!((number(&verdict, "spring", "stiffness") - 0.5).abs() < 0.05);
+        let friction = verdict.findings.iter().find(|f| f.physics == "coulomb").unwrap();
+        assert!(friction.confidence <= 0.5 && friction.family_confidence > 0.9, "{friction:?}");
+        assert!(verdict.audit.iter().any(|remark| remark.what == "same_force"), "{:?}", verdict.audit);
+    }
+    // Without a spring a constant is seen.
+    let verdict = said(move |[_, v, _]| by_direction(v), 0.02, 0.0, 1e-4);
+    let friction = verdict.findings.iter().find(|f| f.physics == "asymmetric_coulomb").unwrap_or_else(|| panic!("{:?}", verdict.findings));
+    assert!(friction.family_confidence > 0.9 && verdict.audit.iter().all(|remark| remark.what != "same_force"), "{friction:?}");
+}
+
+#[test]
 fn a_drive_that_logs_zeros_while_it_rests_hides_nothing() {
     let verdict = said(|[_, v, _]| 0.1 * v.signum(), 0.02, 2.0, 1e-4);
     // A torque of 0 at rest may as well be a friction that is lower there: the level at speed is known.

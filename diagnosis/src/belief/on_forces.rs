@@ -86,8 +86,10 @@ pub(crate) fn figures(rooms: &[Room], explored: &Explored, law: usize) -> [Figur
 pub(crate) fn belief(rooms: &[Room], explored: &Explored, law: usize) -> Belief {
     let [own, kind] = figures(rooms, explored, law);
     let tuning = &tuning().equation_error;
-    let (law, kind) = (logistic(&tuning.confidence, &own), logistic(&tuning.kind_confidence, &kind));
-    Belief { law, kind: kind.max(law) }
+    let (sure, kind) = (logistic(&tuning.confidence, &own), logistic(&tuning.kind_confidence, &kind));
+    // Of two laws that are the same force here one is as likely as the other.
+    let law = if rooms.first().and_then(|room| room.same_force(&explored.best().laws, law)).is_some() { sure.min(0.5) } else { sure };
+    Belief { law, kind: kind.max(sure) }
 }
 
 fn logistic([constant, coefficients @ ..]: &[f64; 7], figures: &Figures) -> f64 {

@@ -16,6 +16,8 @@ pub struct OnForces {
     pub beliefs: Vec<(String, Belief)>,
     /// Effects that belong to another one, such as the zero of a spring, by id.
     pub companions: Vec<String>,
+    /// Laws of it that are the same force as another one, which its place allows as well: one sentence each.
+    pub same_force: Vec<String>,
     /// Residual of the claimed structure with its parameters refined by simulation, in noise standard deviations of the force's sensor in that band: rms.
     pub left: f64,
     /// Whether so much is left, of the force and beside the sensor's noise, that a law that is only simulated may be what is missing.

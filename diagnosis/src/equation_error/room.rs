@@ -4,7 +4,7 @@ use super::gram::{Gram, Left, Sum};
 use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
 use crate::output_error::simulate::predict;
 use crate::output_error::structure::{Role, Structure};
-use crate::physics;
+use crate::physics::{self, contains};
 use crate::recordings::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::model::Model;
@@ -236,6 +236,20 @@ impl Room {
             x.id == y.id || x.place.same(&y.place) && rub(x) && rub(y) || lopsided(x) && lopsided(y) || !x.compatible(y)
         };
         a != b && own(a).all(|x| own(b).all(|y| !alike(x, y)))
+    }
+
+    /// A richer law at the place of one of `laws` that is the same force beside the rest of them: what it has more is a constant, and so is the free zero of a
+    /// spring. No motion separates the two.
+    pub fn same_force(&self, laws: &[usize], law: usize) -> Option<usize> {
+        let own = self.named(law);
+        let has_zero = |other: &usize| {
+            *other != law && self.laws[*other].hypotheses.iter().skip(1).any(|h| self.hypotheses[*h].physics.family == Family::Bias)
+        };
+        let is_same = |other: &usize| {
+            let other = self.named(*other);
+            other.physics.facts.twin.is_some() && contains(other.physics, own.physics) && other.place.same(&own.place)
+        };
+        if laws.iter().any(has_zero) { (0..self.laws.len()).find(is_same) } else { None }
     }
 
     fn sum(&self, laws: &[Chosen]) -> Sum {

@@ -73,6 +73,7 @@ pub(crate) fn search_on_forces(
         false => chosen.iter().filter(is_alike).map(|l| key_of(added(room, l, band).iter().map(|(h, _)| h))).collect(),
     };
     let claimed = key_of(added(room, best, band).iter().map(|(h, _)| h));
+    let same_force = best.laws.iter().filter_map(|law| Some(same_force(room, *law, room.same_force(&best.laws, *law)?))).collect();
     // As far as the refinement by simulation brings it.
     let refined = found.iter().find(|c| c.structure.name() == claimed).map_or(1.0, |c| c.levels.iter().fold(0.0f64, |a, b| a.max(*b)));
     let forces = OnForces {
@@ -81,6 +82,7 @@ pub(crate) fn search_on_forces(
         claimed,
         beliefs,
         companions: companions.collect(),
+        same_force,
         left: refined * noise / sensor,
         is_beyond,
         alike,
@@ -110,6 +112,16 @@ pub(crate) fn search_on_forces(
     };
     drop(evaluator);
     Some((problem, search))
+}
+
+/// That a law and a richer one are the same force beside a spring whose zero is free.
+fn same_force(room: &Room, law: usize, other: usize) -> String {
+    let (law, other) = (room.named(law), room.named(other));
+    format!(
+        "{} may as well be {}: beside a spring whose zero is not measured both are the same force, and no motion separates them. Measure the position in which \
+         the spring pulls with no force",
+        law.physics.words, other.physics.words
+    )
 }
 
 /// Where refined by simulation a law of the claimed structure comes out as nothing: the place of the structure without it.

@@ -213,7 +213,7 @@ pub struct RecordErrors {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Remark {
     /// What was looked at: `clock`, `gaps`, `short`, `missing`, `constant`, `outliers`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`,
-    /// `repeats`, `noise`, `timing`, `hold`, `thinned`, `velocity`.
+    /// `repeats`, `noise`, `timing`, `hold`, `thinned`, `velocity`, `band`, `same_force`.
     pub what: String,
     /// Recordings, signal, or both.
     #[serde(rename = "where")]
