@@ -28,18 +28,16 @@ const ALIKE: f64 = 0.05;
 /// Scales of errors are renewed if their logarithms changed by this much on average.
 const RESCALED: f64 = 0.2;
 /// Effects that are also tried two at a time: neither alone need show.
-const PAIRS: [[&str; 2]; 5] = [
+const PAIRS: [[&str; 2]; 8] = [
     ["speed_limit", "acceleration_limit"],
     ["gravity", "load_friction"],
     ["payload", "load_friction"],
     ["coulomb", "dead_band"],
     ["gravity", "gain"],
+    ["coulomb", "saturation"],
+    ["coulomb", "speed_limit"],
+    ["coulomb", "acceleration_limit"],
 ];
-/// Pairs that are tried only where no single effect is accepted. Two effects at once lower errors more than the right one alone, and the second then keeps
-/// better ones out.
-const TOGETHER: [[&str; 2]; 3] = [["coulomb", "saturation"], ["coulomb", "speed_limit"], ["coulomb", "acceleration_limit"]];
-/// Kinds of moves in a round, each only where those before find nothing.
-const STAGES: usize = 3;
 
 /// A structure with its fit and its errors on what the fit has not seen.
 #[derive(Debug, Clone)]
@@ -308,18 +306,15 @@ impl Searcher<'_> {
         total(better) < (1.0 - LEAST) * total(base) && self.gain(base, better).is_none_or(|g| g.mean > 0.0)
     }
 
-    /// What a round may do, in stages: add an effect, or two that need each other; two that hide each other; replace one by a
-    /// rival.
+    /// What a round may do, in two stages: add an effect, or two that need each other; replace one by a rival.
     fn moves(&self, best: &Candidate, stage: usize) -> Vec<Move> {
         let singles = ALL.iter().filter(|p| self.may(p, &best.added)).map(|p| Move { adds: vec![p], drops: None });
-        let pairs = |list: &'static [[&'static str; 2]]| {
-            list.iter().filter_map(|[a, b]| {
-                let (a, b) = (named(a)?, named(b)?);
-                let mut with = best.added.clone();
-                with.push(a.name);
-                (self.may(a, &best.added) && self.may(b, &with)).then(|| Move { adds: vec![a, b], drops: None })
-            })
-        };
+        let pairs = PAIRS.iter().filter_map(|[a, b]| {
+            let (a, b) = (named(a)?, named(b)?);
+            let mut with = best.added.clone();
+            with.push(a.name);
+            (self.may(a, &best.added) && self.may(b, &with)).then(|| Move { adds: vec![a, b], drops: None })
+        });
         let swaps = best.added.iter().filter_map(|name| named(name)).flat_map(|old| {
             let kept: Vec<&str> = best.added.iter().copied().filter(|n| *n != old.name).collect();
             old.rivals
@@ -329,10 +324,8 @@ impl Searcher<'_> {
                 .map(|new| Move { adds: vec![new], drops: Some(old) })
                 .collect::<Vec<_>>()
         });
-        let is_allowed = |change: &Move| self.are_allowed(best.added.len() + change.adds.len());
         match stage {
-            0 => singles.chain(pairs(&PAIRS)).filter(is_allowed).collect(),
-            1 => pairs(&TOGETHER).filter(is_allowed).collect(),
+            0 => singles.chain(pairs).filter(|change| self.are_allowed(best.added.len() + change.adds.len())).collect(),
             _ => swaps.collect(),
         }
     }
@@ -360,7 +353,7 @@ impl Searcher<'_> {
 
     /// Screens every move, and takes the best that is better beyond chance.
     fn round(&mut self, best: &Candidate) -> Option<Candidate> {
-        (0..STAGES).find_map(|stage| self.stage(best, stage))
+        (0..2).find_map(|stage| self.stage(best, stage))
     }
 
     fn stage(&mut self, best: &Candidate, stage: usize) -> Option<Candidate> {

@@ -88,7 +88,10 @@ fn dry_friction_and_a_limit_of_the_torque_are_found_together() {
     let added = &found.answers[0].found.best.added;
     assert!(added.contains(&"coulomb") && added.contains(&"saturation"), "{added:?}");
     let numbers = found.model.servos[0].numbers;
-    assert!((numbers[Number::Friction] - 0.03).abs() < 0.004 && (numbers[Number::Limit] - 0.08).abs() < 0.008, "{numbers:?}");
+    assert!((numbers[Number::Friction] - 0.03).abs() < 0.003, "{numbers:?}");
+    // Delay, damping and limit share what the limit slows down; the top speed is determined.
+    let top = |n: &Numbers| (n[Number::Limit] - n[Number::Friction]) / n[Number::Damping];
+    assert!((top(&numbers) / top(&truth) - 1.0).abs() < 0.02, "{numbers:?}");
 }
 
 #[test]
