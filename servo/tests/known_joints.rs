@@ -80,6 +80,21 @@ fn dry_friction_is_found_with_its_size_and_its_rival_is_named() {
 }
 
 #[test]
+fn dry_friction_and_a_limit_of_the_torque_are_found_together() {
+    let mut truth = base();
+    truth[Number::Friction] = 0.03;
+    truth[Number::Limit] = 0.08;
+    let found = diagnose(&problem(joint(&truth)), &Options::default(), None, &|_| ()).unwrap();
+    let added = &found.answers[0].found.best.added;
+    assert!(added.contains(&"coulomb") && added.contains(&"saturation"), "{added:?}");
+    let numbers = found.model.servos[0].numbers;
+    assert!((numbers[Number::Friction] - 0.03).abs() < 0.003, "{numbers:?}");
+    // Delay, damping and limit share what the limit slows down; the top speed is determined.
+    let top = |n: &Numbers| (n[Number::Limit] - n[Number::Friction]) / n[Number::Damping];
+    assert!((top(&numbers) / top(&truth) - 1.0).abs() < 0.02, "{numbers:?}");
+}
+
+#[test]
 fn a_search_that_is_cut_short_says_so_and_gives_no_green_answer() {
     let mut truth = base();
     truth[Number::Friction] = 0.02;
