@@ -18,7 +18,7 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
     if options.json {
         output::json(&done.json(options.out.as_deref()))?;
     } else {
-        told(options, &done)?;
+        reported(options, &done)?;
     }
     Ok(ended(&done))
 }
@@ -59,7 +59,7 @@ fn resolved(asked: &cli::Export) -> Options {
 }
 
 /// For a person: the text where it has no file, and the list.
-fn told(options: &cli::Export, done: &Done) -> Result<(), Failure> {
+fn reported(options: &cli::Export, done: &Done) -> Result<(), Failure> {
     let list = list(options, &done.exported.left_out, done.errors.as_ref());
     match &options.out {
         Some(out) => {

@@ -106,13 +106,13 @@ fn wants_json() -> bool {
 /// The exit code; everything is said by then.
 pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
     let words = std::iter::once("backdrive".into()).chain(called().arguments.iter().cloned());
-    P::try_parse_from(words).map_err(|told| {
-        let printed = told.print().and_then(|()| io::stdout().flush());
+    P::try_parse_from(words).map_err(|wrong| {
+        let printed = wrong.print().and_then(|()| io::stdout().flush());
         match written(printed) {
-            Err(failure) if !told.use_stderr() => fail(&failure),
-            _ if !told.use_stderr() => ExitCode::SUCCESS,
+            Err(failure) if !wrong.use_stderr() => fail(&failure),
+            _ if !wrong.use_stderr() => ExitCode::SUCCESS,
             _ => {
-                let message = told.render().to_string();
+                let message = wrong.render().to_string();
                 tell_program(&Failure { code: code::USAGE, message: message.trim_start_matches("error: ").trim_end().to_string() });
                 ExitCode::from(code::USAGE)
             }

@@ -32,14 +32,14 @@ pub struct Opened {
 pub fn open(recordings: &Recordings, model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, SetError> {
     let grip = grip.filter(|g| *g != Path::new("none"));
     let mut notes = Vec::new();
-    let (mut set, told) = set_of(recordings)?;
+    let (mut set, states_fit) = set_of(recordings)?;
     if model.is_none() && set.model.is_none() {
         let first = recordings.first();
         return Err(SetError::new(format!(
             "{first}: no model is named; give one with --model MODEL.toml, or a set.toml with model = \"...\""
         )));
     }
-    hold_out(&mut set, told, &mut notes);
+    hold_out(&mut set, states_fit, &mut notes);
     notes.extend(checks::repeated(&set)?);
     notes.extend(set.paths().iter().filter_map(|path| unfinished(path)));
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| begun(&set, file)));
@@ -83,19 +83,19 @@ pub fn set_of(recordings: &Recordings) -> Result<(RecordingSet, bool), SetError>
             if let Some(command) = import_command(one) {
                 return Err(SetError::new(format!("{}: is not a set of recordings yet: `{command}` makes it one", one.display())));
             }
-            let told = !one.is_dir() || one.join("set.toml").exists();
-            Ok((RecordingSet::open(one)?, told))
+            let states_fit = !one.is_dir() || one.join("set.toml").exists();
+            Ok((RecordingSet::open(one)?, states_fit))
         }
         _ => Ok((of_files(paths)?, false)),
     }
 }
 
 /// Holds the last of several recordings out where the set does not say what is.
-pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
+pub fn hold_out(set: &mut RecordingSet, states_fit: bool, notes: &mut Vec<String>) {
     if set.held_out.is_empty() {
         match set.fit.len() {
             // Where a set.toml states what is fitted, that is not changed.
-            _ if told => notes.push(
+            _ if states_fit => notes.push(
                 "no recording is held out, so the improvement is shown on the fitted ones; name some under held_out in set.toml"
                     .to_string(),
             ),

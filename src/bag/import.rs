@@ -12,7 +12,7 @@ pub fn import(asked: &BagImport) -> Result<u8, Failure> {
     for planned in import.planned().map_err(Failure::bag)? {
         let importing = format!("importing {}", planned.from.display());
         let made = busy(&importing, || import.carry_out(&planned)).map_err(Failure::bag)?;
-        made.iter().try_for_each(told)?;
+        made.iter().try_for_each(reported)?;
     }
     Ok(0)
 }
@@ -36,7 +36,7 @@ fn resolved(asked: &BagImport) -> Result<Import, Failure> {
 }
 
 /// One bag that was made.
-fn told(made: &Imported) -> Result<(), Failure> {
+fn reported(made: &Imported) -> Result<(), Failure> {
     let (from, to) = (made.from.display(), made.to.display());
     match &made.report {
         Report::Table(report) => {

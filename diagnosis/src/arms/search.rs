@@ -113,9 +113,10 @@ fn beside_least_squares(data: &mut Data, without: &[String], most: usize, limit:
         return Ok(found);
     }
     data.see(&data.problem.bodies.nominal)?;
-    let again = search_within(data, without, most, limit, Start::Common)?;
+    let mut again = search_within(data, without, most, limit, Start::Common)?;
     let is_worse = compare(data, &again.best, &found.best, &found.weights).is_some_and(|g| g.is_sure());
     if !is_worse && behind_least_squares(data, without, &again).len() < behind.len() {
+        again.under_one_load.extend(&found.under_one_load);
         return Ok(again);
     }
     data.see(&data.parameters(&found.best))?;
