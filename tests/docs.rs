@@ -200,7 +200,7 @@ fn run_in_order(shown: Vec<Shown>) -> Vec<(String, i32)> {
 #[test]
 fn the_readme_s_two_doors_work_as_they_stand() {
     let lines = std::fs::read_to_string(file("README.md")).unwrap().lines().count();
-    assert!(lines <= 120, "{lines} lines: a stranger reads it in a minute");
+    assert!(lines <= 100, "{lines} lines: a stranger reads it in a minute");
     assert_eq!(blocks("README.md").len(), 2);
     follow(&Place::new(), "README.md");
 }
