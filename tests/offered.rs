@@ -43,7 +43,8 @@ fn in_page(page: &str) -> Vec<String> {
     let between = |begin: &str, end: &str| -> Vec<String> {
         page.split(begin).skip(1).filter_map(|rest| rest.split(end).next()).map(plain).collect()
     };
-    let all = between("<pre><code>", "</code></pre>").into_iter().chain(between("<td>", "</td>"));
+    let cells = between("<td", "</td>").into_iter().filter_map(|cell| cell.split_once('>').map(|(_, text)| text.to_string()));
+    let all = between("<pre><code>", "</code></pre>").into_iter().chain(cells);
     let lines: Vec<String> = all.flat_map(|text| text.lines().map(str::to_string).collect::<Vec<_>>()).collect();
     lines.into_iter().filter(|line| line.starts_with("backdrive ")).collect()
 }

@@ -134,7 +134,7 @@ fn headline(done: &Done) -> (Tone, String) {
             Tone::Warning,
             format!(
                 "Not stable{gain}: a limit cycle of ±{} at {} persists while the hand holds still.",
-                si(amplitude_m, unit.symbol()),
+                unit.text(amplitude_m),
                 si(frequency_hz, "Hz")
             ),
         ),

@@ -278,7 +278,8 @@ struct Look {
     shape: usize,
 }
 
-/// Colours, dashes and marks. Bands and discs take the colour of the series that comes next.
+/// Colours, dashes and marks. Bands and discs take the colour of the series that comes next. A colour by number has the dash and the mark of that
+/// number, so that a thing looks alike in every plot of a stack.
 fn looks(series: &[Series]) -> Vec<Look> {
     let (mut colour, mut lines, mut points) = (0, 0, 0);
     let mut out = Vec::new();
@@ -293,14 +294,15 @@ fn looks(series: &[Series]) -> Vec<Look> {
         if matches!(s.kind, Kind::Line | Kind::Points | Kind::Bars) && s.colour == Colour::Auto {
             colour += 1;
         }
+        let nth = |count: usize| if let Colour::Nth(n) = s.colour { n } else { count };
         let dash = match s.dash {
-            Dash::Auto => DASHES.get(lines % PALETTE).copied().unwrap_or(""),
+            Dash::Auto => DASHES.get(nth(lines) % PALETTE).copied().unwrap_or(""),
             Dash::Solid => "",
             Dash::Dashed => "7 3.5",
             Dash::Dotted => "2 2.5",
             Dash::DashDot => "10 3 2 3",
         };
-        out.push(Look { colour: class, dash, shape: points });
+        out.push(Look { colour: class, dash, shape: nth(points) });
         match s.kind {
             Kind::Line => lines += 1,
             Kind::Points => points += 1,

@@ -151,12 +151,12 @@ const DRAW = {
 const label = (words, x, y, tone, align) => ({type: 'text', silent: true, x, y, style: {text: words, fill: colour(tone + '-text'), align,
   verticalAlign: 'middle', font: FONT + 'px ' + getComputedStyle(document.body).fontFamily, stroke: paper, lineWidth: 3}});
 
-// Spans of x, with their names where there is room; the legend has them all.
+// Spans of x, with their names where there is room, in a wide drawing; the legend has them all.
 const regions = (panel, base) => own(base, (api, frame) => group(panel.regions.flatMap(r => {
   const x0 = Math.max(frame.x, api.coord([r.from, panel.y.lo])[0]), x1 = Math.min(frame.x + frame.width, api.coord([r.to, panel.y.lo])[0]);
   if (x1 <= x0) return [];
   const out = [{type: 'rect', shape: {x: x0, y: frame.y, width: Math.max(x1 - x0, 0.5), height: frame.height}, style: {fill: colour(r.tone), opacity: r.tone === 'neutral' ? 0.07 : 0.15}}];
-  if (r.label && widthOf(r.label) + 10 < x1 - x0) out.push(label(r.label, (x0 + x1) / 2, frame.y + frame.height - 11, r.tone, 'center'));
+  if (r.label && frame.width > 420 && widthOf(r.label) + 10 < x1 - x0) out.push(label(r.label, (x0 + x1) / 2, frame.y + frame.height - 11, r.tone, 'center'));
   return out;
 })), {z: 0});
 
@@ -239,16 +239,25 @@ function swatch(s) {
   return svg(`<g fill="${c}">${shapes[s.shape % 6]}</g>`);
 }
 
+// Names and colours of the first panel that further panels repeat have one entry, which shows and hides the curve in all of them. A panel whose only
+// curve is named by its heading has none.
 function legend(stack, data, toggle) {
   const box = document.createElement('div');
   box.className = 'legend';
+  const like = (a, b) => a.name === b.name && a.colour === b.colour;
+  const entries = data.panels.map((panel, p) => panel.series.map((s, i) => ({s, keys: [p + '.' + i]})).filter(e => e.s.name));
+  const first = entries[0] || [];
+  const shared = entries.map((own, p) => p > 0 && own.length > 0 && own.every(e => first.some(f => like(e.s, f.s))));
+  entries.forEach((own, p) => { if (shared[p]) own.forEach(e => first.find(f => like(e.s, f.s)).keys.push(...e.keys)); });
+  const oneForAll = entries.every((own, p) => p === 0 || shared[p] || !own.length);
   data.panels.forEach((panel, p) => {
-    const named = panel.series.map((s, i) => ({s, key: p + '.' + i})).filter(e => e.s.name);
+    const titles = [panel.title, panel.y.label];
+    const named = shared[p] || (entries[p].length === 1 && !entries[p][0].s.by && titles.includes(entries[p][0].s.name)) ? [] : entries[p];
     const spans = panel.regions.filter((r, i) => r.label && panel.regions.findIndex(o => o.label === r.label && o.tone === r.tone) === i);
     if (!named.length && !spans.length) return;
     const row = box.appendChild(document.createElement('div'));
-    if (data.panels.length > 1 && panel.y.label) row.appendChild(document.createElement('span')).textContent = panel.y.label + ':';
-    for (const {s, key} of named) {
+    if (!oneForAll && data.panels.length > 1 && panel.y.label && named.length) row.appendChild(document.createElement('span')).textContent = panel.y.label + ':';
+    for (const {s, keys} of named) {
       const button = row.appendChild(document.createElement('button'));
       button.type = 'button';
       button.title = 'show or hide';
@@ -256,7 +265,7 @@ function legend(stack, data, toggle) {
       button.innerHTML = swatch(s);
       const scale = s.by && shade(s.by);
       button.append(s.name + (scale ? `, ${s.by.label} ${withUnit(scale.lo, s.by.unit)} to ${withUnit(scale.hi, s.by.unit)}` : ''));
-      button.onclick = () => button.setAttribute('aria-pressed', String(toggle(key)));
+      button.onclick = () => button.setAttribute('aria-pressed', String(keys.map(toggle).pop()));
     }
     for (const r of spans) {
       const entry = row.appendChild(document.createElement('span'));

@@ -91,5 +91,8 @@ font-size:.88rem;white-space:pre-wrap;overflow-wrap:anywhere}.todo code span{whi
 border:1px solid var(--faint);border-radius:4px;cursor:pointer}\n\
 details{margin:12px 0;border:1px solid var(--faint);border-radius:6px;padding:0 14px}summary{cursor:pointer;padding:8px 0;font-weight:600}\n\
 @media (max-width:720px){.long{min-width:15rem}body{font-size:15px}.lead{font-size:1.12rem}}\n\
+@media screen and (max-width:600px){.cards,.cards tbody,.cards tr,.cards td{display:block;min-width:0;text-align:left;white-space:normal}.cards thead{display:none}\
+.cards tr{border-bottom:1px solid var(--muted);padding:6px 0}.cards td{border:0;padding:1px 0}.cards td:empty{display:none}\
+.cards td[data-label]::before{content:attr(data-label) \": \";color:var(--muted);font-weight:400}.todo ul{padding-left:1.2em}}\n\
 @media print{body{font-size:10.5pt}main{max-width:none;padding:0}figure,.lead,.aside,tr{break-inside:avoid}h2{break-after:avoid}\
 .scroll{overflow:visible}table{font-size:8.5pt}th,td{padding-right:8px}.num{white-space:normal}}\n";

@@ -3,6 +3,9 @@
 use crate::escape::escape;
 use crate::style::Tone;
 
+/// Characters from which a cell counts as a sentence.
+const LONG: usize = 48;
+
 /// How a column stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
@@ -97,7 +100,11 @@ impl Table {
         }
         let classes: Vec<&str> = (0..columns).map(|c| self.class(c)).collect();
         let attribute = |class: &str| if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
-        let mut out = String::from("<div class=\"scroll\"><table>\n");
+        // On a narrow screen a table with sentences, or with many columns of words, is a list of its rows; one of numbers scrolls.
+        let longest = self.rows.iter().flatten().map(|cell| cell.text.chars().count()).max().unwrap_or(0);
+        let has_sentences = (columns > 2 && longest >= LONG) || (columns > 4 && longest >= LONG / 2);
+        let cards = if has_sentences && !self.headers.is_empty() { " class=\"cards\"" } else { "" };
+        let mut out = format!("<div class=\"scroll\"><table{cards}>\n");
         if !self.headers.is_empty() {
             let cells = classes.iter().enumerate().map(|(i, class)| {
                 let text = self.headers.get(i).map_or("", String::as_str);
@@ -113,11 +120,13 @@ impl Table {
                 // Sentences need room, or a narrow screen makes them towers of words.
                 let room = match cell.text.chars().count() {
                     0..16 => "",
-                    16..48 => "some",
+                    16..LONG => "some",
                     _ => "long",
                 };
                 let classes: Vec<&str> = [*class, tone.as_str(), room].into_iter().filter(|c| !c.is_empty()).collect();
-                format!("<td{}>{}</td>", attribute(&classes.join(" ")), escape(&cell.text))
+                let header = self.headers.get(i).filter(|header| !cards.is_empty() && !header.is_empty());
+                let label = header.map_or(String::new(), |header| format!(" data-label=\"{}\"", escape(header)));
+                format!("<td{}{label}>{}</td>", attribute(&classes.join(" ")), escape(&cell.text))
             });
             out += &format!("<tr>{}</tr>\n", cells.collect::<String>());
         }
@@ -155,5 +164,15 @@ mod tests {
         assert!(html.contains("<td>short</td><td class=\"num\"></td><td class=\"num\"></td>"));
         assert!(Table::new(["a"]).row(["1"]).align(0, Align::Left).html().contains("<td>1</td>"));
         assert_eq!(Table::default().html(), "");
+    }
+
+    #[test]
+    fn a_table_with_sentences_names_the_column_in_each_cell_for_narrow_screens() {
+        let sentence = "It is a sentence that needs more room than a column has.";
+        let html = Table::new(["where", "", "what <"]).row(["a", "b", sentence]).html();
+        assert!(html.contains("<table class=\"cards\">"), "{html}");
+        assert!(html.contains("<td data-label=\"where\">a</td><td>b</td><td class=\"long\" data-label=\"what &lt;\">"), "{html}");
+        assert!(!Table::new(["where", "what"]).row(["a", sentence]).html().contains("cards"), "two columns fit");
+        assert!(!Table::new(["a", "b", "c"]).row(["1", "2", "3"]).html().contains("cards"), "numbers are compared along a column");
     }
 }

@@ -21,7 +21,7 @@ pub fn joint_of(finding: &Finding) -> &str {
 pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> String {
     let of = |joint: &str| {
         let all: Vec<String> = findings.iter().filter(|f| joint_of(f) == joint && f.confidence >= 0.5).map(|f| words(&f.physics)).collect();
-        (!all.is_empty()).then(|| format!("{joint}: {}", all.join(", ")))
+        (!all.is_empty()).then(|| format!("{} at the {joint}", all.join(", ")))
     };
     let joints: Vec<String> = servo.joints.iter().filter_map(|j| of(&j.joint)).collect();
     match word {
@@ -33,6 +33,6 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> S
         _ if joints.is_empty() => {
             "an effect beyond delay, second order and offset is present, but these recordings do not show which one".to_string()
         }
-        _ => format!("in addition to delay, second order and offset: {}", joints.join("; ")),
+        _ => format!("delay, second order and offset leave out {}", joints.join("; ")),
     }
 }

@@ -4,14 +4,17 @@ pub mod links;
 mod text;
 
 use crate::failure::{Failure, code};
+use crate::offered::{Builder, Step, lines, plain};
 use crate::{cli, interrupt, output, progress};
 use backdrive_nodes::graph::Overrides;
+use backdrive_pages::compare::choice::{choice, laws, sentence};
 use backdrive_pages::compare::compared::Compared;
 use backdrive_pages::compare::page;
 use backdrive_stability::compare::Cell;
 use backdrive_stability::compare::asked::{Asked, Options};
 use links::Links;
 use serde_json::{Value, json};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compares.
@@ -22,13 +25,16 @@ pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
     }
     let done = Done::of(&resolved(options), &cancel)?;
     let compared = done.compared();
+    let steps = next(&compared, &options.session);
     if options.json {
         output::json(&done.json())?;
     } else {
         output::line(text::text(&compared))?;
+        output::line(format!("\nanswer    {}", sentence(&compared)))?;
+        lines("next", 10, &steps).into_iter().try_for_each(output::line)?;
     }
     if let Some(html) = &options.html {
-        output::page(html, page(&compared))?;
+        output::page(html, page(&compared, &steps))?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if cancel.load(Ordering::SeqCst) {
@@ -86,8 +92,17 @@ impl Done {
 
     /// The text of the page.
     pub fn html(&self) -> String {
-        output::html(page(&self.compared()))
+        output::html(page(&self.compared(), &[]))
     }
+}
+
+/// A run of the session with the law to take.
+fn next(compared: &Compared, session: &Path) -> Vec<Step> {
+    let laws = laws(compared);
+    let Some(law) = choice(&laws) else { return Vec::new() };
+    let run = Builder::verb("run").reads(session).option("--coupling", law.name).option("--lambda", plain(compared.gains[1]));
+    let run = run.option_writes("--html", Path::new("run.html"));
+    vec![Step::new(format!("Run the session with {}, and look at its motion.", law.name), [run.build()])]
 }
 
 /// The options of the work.

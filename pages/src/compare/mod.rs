@@ -1,13 +1,16 @@
-//! The page of a comparison: one picture, one table.
+//! The page of a comparison: which law to take, one picture, one table.
 
 pub mod cells;
+pub mod choice;
 pub mod compared;
 
-use crate::parts::ending;
+use crate::offered::Step;
+use crate::parts::{ending, sentence, symbols, todo};
 use backdrive_report::{Cell as Shown, Colour, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_stability::compare::{Cell, Varied};
 use backdrive_stability::outcome::Outcome;
 use cells::{COLUMNS, row};
+use choice::{Law, RESERVE, choice, decibels, laws};
 use compared::Compared;
 
 /// The terms of the page.
@@ -21,15 +24,20 @@ const TERMS: [(&str, &str); 4] = [
 /// A quantity of a cell, for one curve of the picture.
 type Of = fn(&Cell) -> Option<f64>;
 
-/// The page.
-pub fn page(compared: &Compared) -> Page {
+/// The page; `steps` are what to do next.
+pub fn page(compared: &Compared, steps: &[Step]) -> Page {
     let [mu, lambda] = compared.gains;
     let mut page = Page::new("Comparison of coupling laws");
-    let (tone, sentence) = headline(compared);
-    page.lead(tone, &sentence);
-    page.text(&format!("{}: {}", compared.session, compared.title));
+    let laws = laws(compared);
+    page.lead(tone(&laws), &choice::sentence(compared));
+    todo(&mut page, steps);
+    page.table(summary(&laws).caption(&format!(
+        "The least favourable of all conditions compared, at μλ = {}. Reserve: the stability limit over this gain.",
+        number(mu * lambda)
+    )));
+    page.text(&format!("{}: {}", compared.session, sentence(compared.title)));
     for note in compared.notes {
-        page.note(note);
+        page.note(&sentence(note));
     }
     if compared.cells.len() < compared.asked {
         page.warning(&format!("Interrupted: {} of {} comparisons were done.", compared.cells.len(), compared.asked));
@@ -66,6 +74,7 @@ pub fn page(compared: &Compared) -> Page {
     )));
     let terms: Vec<(&str, &str)> = TERMS.into_iter().chain(COLUMNS.into_iter().skip(2)).collect();
     ending(&mut page, &terms);
+    symbols(&mut page);
     page
 }
 
@@ -79,29 +88,31 @@ fn tone_of(outcome: &Outcome) -> Tone {
     }
 }
 
-/// Which laws are stable at the gain of the comparison under every condition.
-fn headline(compared: &Compared) -> (Tone, String) {
-    let laws = laws(compared);
-    let always = |law: &&&str| compared.cells.iter().filter(|c| c.rival == **law).all(|c| c.outcome.is_stable());
-    let good: Vec<&str> = laws.iter().filter(always).copied().collect();
-    let [mu, lambda] = compared.gains;
-    let at = number(mu * lambda);
-    match good.len() {
-        0 => (Tone::Bad, format!("At μλ = {at} no law is stable under every condition compared.")),
-        n if n == laws.len() => (Tone::Good, format!("At μλ = {at} every law is stable under every condition compared.")),
-        _ => (Tone::Neutral, format!("At μλ = {at} stable under every condition compared: {}.", good.join(", "))),
+/// The colour of the choice.
+fn tone(laws: &[Law]) -> Tone {
+    match choice(laws) {
+        Some(law) if law.reserve >= RESERVE => Tone::Good,
+        Some(_) => Tone::Warning,
+        None => Tone::Bad,
     }
 }
 
-/// The laws in the order of the table.
-fn laws<'a>(compared: &'a Compared) -> Vec<&'a str> {
-    let mut laws: Vec<&str> = Vec::new();
-    for cell in compared.cells {
-        if !laws.contains(&cell.rival.as_str()) {
-            laws.push(&cell.rival);
-        }
+/// A row per law.
+fn summary(laws: &[Law]) -> Table {
+    let taken = choice(laws).map(|law| law.name);
+    let mut table = Table::new(["law", "", "reserve", "stiffness displayed", "drag"]);
+    for law in laws {
+        let (word, tone) = match law.is_stable {
+            true if taken == Some(law.name) => ("take this", Tone::Good),
+            true => ("stable", Tone::Neutral),
+            false => ("not stable", Tone::Bad),
+        };
+        let stiffness = law.stiffness.map_or("–".to_string(), |share| format!("{:.0} %", 100.0 * share));
+        let drag = law.drag.map_or("–".to_string(), |drag| format!("{drag:.1} N s/m"));
+        let reserve = Shown::tone(decibels(law.reserve), if law.reserve >= RESERVE { Tone::Good } else { Tone::Warning });
+        table.push([Shown::from(law.name), Shown::tone(word, tone), reserve, stiffness.into(), drag.into()]);
     }
-    laws
+    table
 }
 
 /// Four quantities over the delay, a line per law.
@@ -112,7 +123,7 @@ fn picture(compared: &Compared) -> Option<Figure> {
     }
     let laws = laws(compared);
     let plot = |plot: Plot, of: Of| {
-        laws.iter().enumerate().fold(plot, |plot, (index, law)| {
+        laws.iter().enumerate().fold(plot, |plot, (index, Law { name: law, .. })| {
             let points = over_delay.iter().filter(|c| c.rival == *law).filter_map(|c| Some((1e3 * c.condition.delay_s, of(c)?)));
             let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
             // A line through one point is none.

@@ -15,7 +15,7 @@ pub(super) fn page(problem: &Problem, found: &Found, about: &About) -> Page {
     let About { name, notes, steps } = about;
     let verdict = &found.verdict;
     let held = !problem.held_out.is_empty();
-    let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));
+    let mut page = Page::new(&format!("Diagnosis of {name} against the model {}", problem.model.name));
     page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     todo(&mut page, steps);
     page.text(&summary(verdict, held));

@@ -77,23 +77,42 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     )));
 }
 
-/// Whole record, the part where the models differ most, and the residual in time and frequency.
+/// One output of a record, and what the three models predict.
+struct Columns<'a> {
+    measured: &'a [f64],
+    given: Option<Vec<f64>>,
+    refitted: Option<Vec<f64>>,
+    diagnosed: Option<Vec<f64>>,
+    label: &'a str,
+    unit: String,
+}
+
+fn columns<'a>(found: &'a Diagnosis, three: &Three<'a>, output: usize) -> Option<Columns<'a>> {
+    let measured = three.record.outputs.get(output)?.as_ref()?;
+    let shown = found.problem.model.outputs.get(output)?;
+    let column = |p: Option<&Predicted>| p.and_then(|p| p.get(output)).and_then(|c| c.clone());
+    Some(Columns {
+        measured,
+        given: column(three.given),
+        refitted: column(three.refitted),
+        diagnosed: column(three.diagnosed),
+        label: &shown.name,
+        unit: unit_of_output(&found.problem, &shown.kind),
+    })
+}
+
+/// The whole record, with its residual folded.
 fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
-    let problem = &found.problem;
-    let (Some(Some(measured)), Some(shown)) = (three.record.outputs.get(output), problem.model.outputs.get(output)) else { return };
-    let column = |p: Option<&'_ Predicted>| p.and_then(|p| p.get(output)).and_then(|c| c.clone());
-    let (given, refitted, diagnosed) = (column(three.given), column(three.refitted), column(three.diagnosed));
-    let unit = unit_of_output(problem, &shown.kind);
+    let Some(Columns { measured, given, refitted, diagnosed, label, unit }) = columns(found, three, output) else { return };
     let period = three.record.period;
     let time: Vec<f64> = (0..measured.len()).map(|k| k as f64 * period).collect();
     let last = diagnosed.as_ref().or(refitted.as_ref());
     let (from, to) = widest(measured, refitted.as_deref().filter(|_| diagnosed.is_some()).or(given.as_deref()), last.map(Vec::as_slice));
     let span = (from as f64 * period, to as f64 * period);
-    let label = shown.name.as_str();
     let name = file_name(&three.record.name);
 
     let mut whole = Plot::new(&format!("{name}: {label}")).x_axis("time", "s").y_axis(label, &unit);
-    whole = whole.region(span.0, span.1, Tone::Limited, "shown below");
+    whole = whole.region(span.0, span.1, Tone::Limited, "where the models differ most");
     if let Some(refitted) = &refitted {
         whole =
             whole.series(Series::line("parameters refitted", &time, refitted).colour(Colour::Nth(0)).dash(Dash::Solid).outside_limits());
@@ -104,7 +123,15 @@ fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     // Last, so that it lies above the predictions.
     whole = whole.series(Series::line("measured", &time, measured).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(whole, "");
+    page.details(&format!("Residual of {name}, {label}"), |inside| residual(inside, found, three, output, (from, to)));
+}
 
+/// The part where the models differ most, and the residual in time and frequency.
+fn residual(page: &mut Page, found: &Diagnosis, three: &Three, output: usize, (from, to): (usize, usize)) {
+    let Some(Columns { measured, given, refitted, diagnosed, label, unit }) = columns(found, three, output) else { return };
+    let period = three.record.period;
+    let time: Vec<f64> = (0..measured.len()).map(|k| k as f64 * period).collect();
+    let name = file_name(&three.record.name);
     let part = |x: &[f64]| x.get(from..to).unwrap_or(&[]).to_vec();
     let near = part(&time);
     let mut zoom = Plot::new("Where the models differ most").x_axis("time", "s").y_axis(label, &unit);

@@ -8,6 +8,7 @@ use backdrive_answers::sentences::{alternatives, confidence, errors, parameters,
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::belief::choice::chosen;
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::output_error::candidate::Candidate;
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_diagnosis::verdict::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
@@ -15,7 +16,9 @@ use backdrive_report::{Cell, Page, Table, Tone, percent};
 /// The report.
 pub(super) fn page(found: &Diagnosis, about: &About) -> Page {
     let best = chosen(&found.search);
-    let mut page = Page::new(&format!("Diagnosis of {} against {}", about.name, found.problem.model.name));
+    let model = &found.problem.model.name;
+    let against = if about.name == *model { String::new() } else { format!(" against the model {model}") };
+    let mut page = Page::new(&format!("Diagnosis of {}{against}", about.name));
     page.lead(tone(found.verdict.word), &sentence(&found.verdict.sentence));
     todo(&mut page, about.steps);
     page.text(&summary(found, adds(best)));
@@ -31,10 +34,9 @@ pub(super) fn page(found: &Diagnosis, about: &About) -> Page {
         page.warning("The search ended before everything was tried.");
     }
     findings(&mut page, &found.verdict);
-    page.section(if found.problem.held_out.is_empty() { "Recordings, as fitted" } else { "Held-out recordings" });
-    held_out::section(&mut page, found, best);
-    page.section("The missing force");
-    force::section(&mut page, found, best);
+    // Where something was found, its force is the picture that shows it first.
+    let sections: [fn(&mut Page, &Diagnosis, &Candidate); 2] = if adds(best) { [force, predictions] } else { [predictions, force] };
+    sections.into_iter().for_each(|section| section(&mut page, found, best));
     page.section("Details");
     page.details("All hypotheses", |inside| tables::hypotheses(inside, found, best));
     page.details("Parameters before and after", |inside| tables::numbers(inside, found, best));
@@ -42,6 +44,18 @@ pub(super) fn page(found: &Diagnosis, about: &About) -> Page {
     page.details("Checks of the recordings", |inside| tables::audit(inside, found));
     ending(&mut page, &TERMS);
     page
+}
+
+/// The force that the nominal model lacks.
+fn force(page: &mut Page, found: &Diagnosis, best: &Candidate) {
+    page.section("The missing force");
+    force::section(page, found, best);
+}
+
+/// What the models predict of each recording.
+fn predictions(page: &mut Page, found: &Diagnosis, best: &Candidate) {
+    page.section(if found.problem.held_out.is_empty() { "Recordings, as fitted" } else { "Held-out recordings" });
+    held_out::section(page, found, best);
 }
 
 /// The terms of the page.

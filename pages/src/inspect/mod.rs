@@ -2,7 +2,7 @@
 
 pub mod response;
 
-use crate::parts::{ending, lines_to_paste};
+use crate::parts::{ending, lines_to_paste, sentence};
 use backdrive_diagnosis::verdict::words::share;
 use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Response, Signal, Weight};
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number};
@@ -27,7 +27,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &lead(report));
     if !report.findings.is_empty() {
         let items: Vec<(String, Option<String>)> =
-            report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
+            report.findings.iter().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
         if !items.is_empty() {
             lines_to_paste(&mut page, &items);
         }
@@ -41,7 +41,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
                 finding.joint.clone().unwrap_or_default().into(),
                 finding.message.clone().into(),
                 share(finding.sure).into(),
-                finding.todo.clone().into(),
+                (if finding.todo.starts_with('[') { "the lines above" } else { finding.todo.as_str() }).into(),
             ]);
         }
         page.table(table);
@@ -95,7 +95,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     }
     page.table(table);
     for note in &report.notes {
-        page.note(note);
+        page.note(&sentence(note));
     }
     ending(&mut page, &TERMS);
     page

@@ -63,7 +63,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
     for (i, plot) in plots.iter_mut().enumerate() {
         let mut drawn = std::mem::replace(plot, Plot::new(""));
         if i == 0 {
-            drawn = drawn.titled("Verdict over the gain product").x_axis("gain product μλ", "").x_log();
+            drawn = drawn.titled("Verdict over the loop gain").x_axis("loop gain μλ", "").x_log();
         }
         for (from, to, word) in verdict_spans(&swept) {
             drawn = drawn.region(from, to, tone(word), if i == 0 { text(word) } else { "" });

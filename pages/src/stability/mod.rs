@@ -109,12 +109,12 @@ fn lead(found: &Answer) -> String {
         (Some(edge), _) => {
             let interval = found.critical_gain_ci95.map_or(String::new(), |ci| format!(" (95 %: {})", interval(ci)));
             let how = match found.critical_frequency_hz {
-                Some(hz) if hz > 0.0 => format!(", where it oscillates at {}", si(hz, "Hz")),
-                Some(_) => ", where it diverges without oscillating".to_string(),
+                Some(hz) if hz > 0.0 => format!(" At the limit it oscillates at {}.", si(hz, "Hz")),
+                Some(_) => " At the limit it diverges without oscillating.".to_string(),
                 None => String::new(),
             };
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
-            format!(" The stability limit is μλ = {}{interval}{how}{by}.", number(edge))
+            format!(" The stability limit is μλ = {}{interval}{by}.{how}", number(edge))
         }
         // Beyond a clamp or an end of the travel no critical gain can be seen.
         (None, Some(least)) if least < found.gain.product() => {
