@@ -8,6 +8,7 @@ use exceptions::{CIRCLES, LONG};
 use modules::Modules;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Most lines of a source file.
 const MOST_LINES: usize = 500;
@@ -22,9 +23,12 @@ fn crates() -> Vec<PathBuf> {
 }
 
 /// All modules of all crates: of a crate with a library and a program each.
-fn all() -> Vec<Modules> {
-    let roots = crates().into_iter().flat_map(|folder| [folder.join("src/lib.rs"), folder.join("src/main.rs")]);
-    roots.filter(|root| root.is_file()).map(|root| Modules::read(&root)).collect()
+fn all() -> &'static [Modules] {
+    static ALL: OnceLock<Vec<Modules>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let roots = crates().into_iter().flat_map(|folder| [folder.join("src/lib.rs"), folder.join("src/main.rs")]);
+        roots.filter(|root| root.is_file()).map(|root| Modules::read(&root)).collect()
+    })
 }
 
 fn name(file: &Path) -> String {

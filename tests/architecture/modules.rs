@@ -35,7 +35,7 @@ impl Modules {
 
     fn add(&mut self, file: PathBuf, folder: PathBuf, parent: Option<usize>) -> usize {
         let text = std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
-        let source = Source::read(&text);
+        let source = Source::read(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
         let (index, names) = (self.0.len(), source.modules.clone());
         self.0.push(Module { file, folder: folder.clone(), parent, children: BTreeMap::new(), source, lines: text.lines().count() });
         for name in names {
@@ -87,7 +87,7 @@ impl Modules {
     fn used_by(&self, module: usize) -> BTreeSet<usize> {
         let source = &self.0[module].source;
         let imports = source.uses.iter().map(|u| u.path.clone());
-        let all = imports.chain(source.paths());
+        let all = imports.chain(source.paths.iter().cloned());
         all.filter_map(|path| self.home(module, &path, MOST_STEPS)).filter(|m| *m != module).collect()
     }
 
