@@ -8,6 +8,7 @@ use skipped::skipped;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
+use system::assert_names;
 use system::{Ended, Place, Running, file, graph_text};
 
 /// One case: the command, its exit code, and the content of the error.
@@ -332,22 +333,18 @@ fn bags() {
     // A bag that was cut off is still a bag.
     let told = place.backdrive(&["bag", "info", "cut.mcap"]);
     assert_eq!(told.code, Some(4), "{told:?}");
-    assert!(
-        told.stdout.contains("the file was not closed; `backdrive bag recover cut.mcap --bag cut-saved.mcap` makes a clean copy"),
-        "{}",
-        told.stdout
-    );
+    assert_names(&told.stdout, &["backdrive bag recover cut.mcap --bag cut-saved.mcap"]);
     let told = place.backdrive(&["bag", "info", "damaged.mcap", "--check"]);
-    assert!(told.code == Some(4) && told.stdout.contains("damaged") && told.stdout.contains("byte"), "{told:?}");
+    told.answers(4, &["byte"]);
     let told = place.backdrive(&["replay", "cut.mcap", "--json"]);
     assert_eq!(told.code, Some(7), "{told:?}");
-    assert!(told.stderr.contains("cut.mcap: was not closed") && told.stderr.contains("bag recover"), "{}", told.stderr);
+    assert_names(&told.stderr, &["cut.mcap", "bag recover"]);
     let steps = told.json()["steps"].as_u64().unwrap();
     assert!((1000..10_000).contains(&steps), "{steps}");
     for bag in ["cut", "damaged"] {
         let (from, to) = (format!("{bag}.mcap"), format!("{bag}-saved.mcap"));
         let told = place.backdrive(&["bag", "recover", &from, "--bag", &to]);
-        assert!(told.code == Some(4) && told.stdout.contains("messages saved"), "{told:?}");
+        assert!(told.code == Some(4) && place.path(&to).is_file(), "{told:?}");
         // What could not be saved is still missing from it.
         assert_eq!(place.backdrive(&["bag", "info", &to]).code, Some(4));
     }
@@ -465,6 +462,6 @@ fn no_right_to_real_time_is_told_and_does_not_stop_a_run() {
         assert_eq!(refused, 1, "{node}: {told:?}");
         assert!(done.stderr.contains(&format!("{node}: warning at step 0: SCHED_FIFO 50: ")), "{}", done.stderr);
     }
-    assert!(done.stderr.contains("RLIMIT_RTPRIO") && done.stderr.contains("RLIMIT_MEMLOCK"), "{}", done.stderr);
+    assert_names(&done.stderr, &["RLIMIT_RTPRIO", "RLIMIT_MEMLOCK"]);
     place.assert_clean(&[]);
 }

@@ -3,6 +3,7 @@
 mod system;
 
 use std::process::{Command, Stdio};
+use system::assert_names;
 use system::{Place, file};
 
 /// Every verb that a person may use, with its parent where it has one, as the help lists them.
@@ -33,7 +34,7 @@ fn every_help_has_an_example_and_says_what_the_exit_codes_mean() {
         let words: Vec<&str> = verb.iter().map(String::as_str).collect();
         let done = place.backdrive(&[&words, &["--help"][..]].concat());
         assert_eq!(done.code, Some(0), "{verb:?}: {done:?}");
-        assert!(done.stdout.contains("Exit code") && done.stdout.contains("Example"), "{verb:?}: {}", done.stdout);
+        assert_names(&done.stdout, &["Exit code", "Example"]);
     }
 }
 
@@ -52,7 +53,7 @@ fn bash_completes_verbs_and_options_with_what_completions_prints() {
     assert_eq!(String::from_utf8_lossy(&bash.stdout), "stability\n--html\n", "{bash:?}");
     for shell in ["zsh", "fish"] {
         let done = place.backdrive(&["completions", shell]);
-        assert!(done.code == Some(0) && done.stdout.contains("stability"), "{shell}: {done:?}");
+        done.answers(0, &["stability"]);
     }
 }
 
@@ -64,7 +65,7 @@ fn man_writes_a_page_for_every_verb() {
     for verb in verbs(&place, &[]) {
         let page = place.path("man1").join(format!("backdrive-{}.1", verb.join("-")));
         let text = std::fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
-        assert!(text.contains(".TH") && text.contains("Exit code"), "{}", page.display());
+        assert_names(&text, &[".TH", "Exit code"]);
     }
     assert!(place.path("man1/backdrive.1").exists());
     assert!(!place.path("man1/backdrive-sealed-master.1").exists(), "what the supervisor starts is no verb of a person");

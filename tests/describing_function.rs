@@ -4,11 +4,15 @@
 //! with it. Between samples each of these loops is linear (or slides under a constant force), so it is carried from sample to sample in closed form,
 //! the sampled delay included. The describing function's own answer stands beside.
 
+#[path = "common/naming.rs"]
+mod naming;
+
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Overrides, Settings};
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::{Gain, RunOptions, Scenario};
+use naming::assert_names;
 use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -340,7 +344,7 @@ fn backlash_in_the_slave_s_drive() {
     assert_close("backlash, describing function", amplitude, root, 0.1);
     // Without the gap, and without the friction that twists the shaft, the same loop is stable: the cycle is the play's.
     let tight = product.slave.replace("gap = 0.0004", "gap = 0.0").replace("force = 0.5", "force = 0.0");
-    assert!(tight.contains("gap = 0.0\n") && tight.contains("force = 0.0\n"), "{tight}");
+    assert_names(&tight, &["gap = 0.0\n", "force = 0.0\n"]);
     let tight = Loop { slave: tight, ..product };
     assert_eq!(tight.outcome(8.0), Outcome::Stable);
 }

@@ -8,6 +8,7 @@ mod system;
 use skipped::skipped;
 use std::path::Path;
 use std::process::Command;
+use system::assert_names;
 use system::{Place, file};
 
 /// Commands that a reader is to type, and what the page shows for them.
@@ -232,14 +233,14 @@ fn two_runs_of_one_graph_keep_both_recordings() {
         assert!(matches!(ended.code, Some(0 | 1)), "{ended:?}");
         ended.stdout
     };
-    assert!(run(&[]).contains("/contact.mcap (complete)"));
+    assert_names(run(&[]), &["/contact.mcap (complete)"]);
     let first = std::fs::read(place.path("contact.mcap")).unwrap();
     let second = run(&["--lambda", "6", "--canceller", "none"]);
-    assert!(second.contains("/contact-2.mcap (complete)") && second.contains("backdrive why contact-2.mcap"), "{second}");
+    assert_names(&second, &["/contact-2.mcap (complete)", "backdrive why contact-2.mcap"]);
     assert_eq!(std::fs::read(place.path("contact.mcap")).unwrap(), first);
     // What is named on the command line is still not replaced without being asked to.
     let named = place.backdrive(&["run", "launch/contact.toml", "--transport", "inproc", "--bag", "contact.mcap"]);
-    assert!(named.code == Some(3) && named.stderr.contains("--overwrite replaces it"), "{named:?}");
+    named.ends(3, &["--overwrite"]);
     // A bag runs again with all that it was run with.
     let again = place.backdrive(&["run", "contact-2.mcap", "--lambda", "0.3", "--bag", "again.mcap"]);
     assert_eq!(again.code, Some(0), "{again:?}");
@@ -249,5 +250,5 @@ fn two_runs_of_one_graph_keep_both_recordings() {
     };
     let canceller = |text: &str| text.split("kind = \"canceller\"").nth(1).unwrap().split("[[").next().unwrap().trim().to_string();
     assert_eq!(canceller(&model("again.mcap")), canceller(&model("contact-2.mcap")));
-    assert!(model("again.mcap").contains("duration_s = 2.4"), "{}", model("again.mcap"));
+    assert_names(model("again.mcap"), &["duration_s = 2.4"]);
 }

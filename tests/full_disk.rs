@@ -6,6 +6,7 @@ mod told;
 
 use std::process::Command;
 use system::{Ended, Place, Running, file};
+use system::{PANIC, assert_names};
 use told::skipped;
 
 /// Sizes of a disk, kB: one page is the smallest that there is. More of them with `BACKDRIVE_LONG=1`.
@@ -86,7 +87,7 @@ fn no_verb_leaves_half_a_file_on_a_full_disk() {
         for size in [&[1 << 16], sizes()].concat() {
             let prepare = if verb.starts_with("init") { "mkdir disk/init" } else { "" };
             let Some((done, names)) = on_a_disk(&place, size, prepare, &verb, "") else { return };
-            assert!(!done.stderr.contains("panicked"), "{verb}: {done:?}");
+            assert!(!done.stderr.contains(PANIC), "{verb}: {done:?}");
             let kept: Vec<&String> = names.iter().filter(|line| line.contains(".backdrive-")).collect();
             assert!(kept.is_empty(), "{verb} on {size} kB: what is unfinished is left: {names:?}");
             match (&whole, done.code) {
@@ -98,7 +99,7 @@ fn no_verb_leaves_half_a_file_on_a_full_disk() {
                 (Some(whole), Some(5)) => {
                     refused += 1;
                     assert_eq!(done.stderr.lines().filter(|l| l.starts_with("error:")).count(), 1, "{verb} on {size} kB: {done:?}");
-                    assert!(done.stderr.contains("No space left on device"), "{verb} on {size} kB: {done:?}");
+                    assert_names(&done.stderr, &["No space left on device"]);
                     // Of several files those are there that were whole before the disk was full, each as on a large disk.
                     for line in names.iter().filter(|line| !whole.contains(line)) {
                         let (name, _) = line.rsplit_once(' ').unwrap();
@@ -143,7 +144,7 @@ fn what_a_run_has_recorded_until_the_disk_was_full_can_be_recovered() {
         // The disk is gone with the process: the bag is copied before.
         let Some((done, _)) = on_a_disk(&place, 600, "", &command, "cp disk/run.mcap kept.mcap") else { return };
         assert_eq!(done.code, Some(5), "{transport}: {done:?}");
-        assert!(done.stderr.contains("No space left on device"), "{transport}: {done:?}");
+        assert_names(&done.stderr, &["No space left on device"]);
         done.json();
         let recovered = place.backdrive(&["bag", "recover", "kept.mcap", "--bag", "saved.mcap", "--overwrite"]);
         assert_eq!(recovered.code, Some(4), "{transport}: {recovered:?}");

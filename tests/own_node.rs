@@ -1,6 +1,10 @@
 //! A program of the user's own instead of a node: examples/own_master.rs, started by launch/own-master.toml.
 
+#[path = "common/naming.rs"]
+mod naming;
+
 use backdrive_bags::{Reader, Signal, signals};
+use naming::assert_names;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -97,5 +101,5 @@ fn without_a_model_its_axes_are_named() {
 fn started_by_hand_it_says_what_it_is() {
     let output = Command::new(own_master()).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("`command` of a node"));
+    assert_names(String::from_utf8_lossy(&output.stderr), &["`command`"]);
 }

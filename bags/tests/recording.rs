@@ -1,10 +1,14 @@
 //! What is recorded is read back, in order, and what is missing is counted.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 mod common;
 
 use backdrive_bags::{BagError, Clock, Reader, Recorder, RecorderOptions, WhenFull};
 use backdrive_msgs::{Message, Sample};
 use common::{FORCE, MEASURED, Random};
+use naming::assert_names;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::time::{Duration, Instant};
 
@@ -192,7 +196,7 @@ fn a_full_disk_stops_the_recording_and_says_so() {
             step += 1;
         }
         let refused = refused.expect("the error reaches the caller").to_string();
-        assert!(refused.contains("/full/run.mcap") && refused.contains("no storage space"), "{refused}");
+        assert_names(&refused, &["/full/run.mcap"]);
         assert!(recorder.health().error.is_some_and(|error| error.contains("no storage space")));
         assert!(matches!(recorder.finish(), Err(BagError::Write { .. })));
     }

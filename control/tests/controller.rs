@@ -1,9 +1,13 @@
 //! The laws against the equations that they were derived from.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 use backdrive_control::controller::*;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_msgs::Sample;
 use backdrive_plant::model::Model;
+use naming::assert_names;
 use std::f64::consts::TAU;
 
 fn axis(friction: &str) -> Model {
@@ -162,7 +166,7 @@ fn a_model_that_these_laws_are_not_for_is_refused_in_words() {
     let refused = |law, model: Option<&Model>| Controller::new(1, &settings(law), model, 0.02, 1e-3).err().unwrap().to_string();
     assert!(refused(Law::Backstepping(GAINS), None).contains("needs a model"));
     let coulomb = axis("kind = \"coulomb\"\nforce = 0.3");
-    assert!(refused(Law::Backstepping(GAINS), Some(&coulomb)).contains("lugre or preisach_lugre"));
+    assert_names(refused(Law::Backstepping(GAINS), Some(&coulomb)), &["lugre", "preisach_lugre"]);
     let mut two = axis(PREISACH);
     two.elements[1].law = backdrive_plant::elements::Law::Spring(backdrive_plant::elements::Spring { stiffness: 1.0, rest: 0.0 });
     assert!(refused(Law::Backstepping(GAINS), Some(&two)).contains("spring to ground"));

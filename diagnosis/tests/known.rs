@@ -1,5 +1,8 @@
 //! Devices with known effects: a missing one is named, and nothing is named where nothing is missing.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 use backdrive_diagnosis::belief::compare::unseen;
 use backdrive_diagnosis::belief::intervals::Uncertainty;
 use backdrive_diagnosis::hypothesis::Place;
@@ -15,6 +18,7 @@ use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::{Condition, Initial};
 use backdrive_plant::stepper::{Options, simulate};
+use naming::assert_names;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -169,7 +173,7 @@ fn dry_friction_that_was_left_out_is_named() {
     assert!((low..=high).contains(&pooled), "{held:?}");
     let mean = each.iter().sum::<f64>() / each.len() as f64;
     assert!((mean / held.nrmse_after.unwrap() - 1.0).abs() < 1e-5 && each.len() == problem.held_out.len(), "{held:?}");
-    assert!(files.model.contains("# a motor and a load"));
+    assert_names(&files.model, &["# a motor and a load"]);
     Model::from_toml(&files.model, "after").unwrap();
 }
 

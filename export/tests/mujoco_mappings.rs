@@ -1,10 +1,14 @@
 //! What each element, input, output and body is in MuJoCo's XML.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 use backdrive_export::{Change, Exported, Part, change_all, mjcf};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::{RobotFile, Tree};
 use nalgebra::DMatrix;
+use naming::assert_names;
 
 fn model(text: &str) -> Model {
     Model::from_toml(text, "model.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
@@ -71,7 +75,7 @@ fn elements_between_bodies_and_dead_bands_are_tendons() {
         found.text
     };
     let text = tendon("['a', 'b']", "kind = 'spring'\nstiffness = 30\nrest = 0.1", &[("stiffness", "30"), ("springlength", "0.1 0.1")]);
-    assert!(text.contains("<joint joint=\"a\" coef=\"1\"/><joint joint=\"b\" coef=\"-1\"/>"), "{text}");
+    assert_names(&text, &["<joint joint=\"a\" coef=\"1\"/><joint joint=\"b\" coef=\"-1\"/>"]);
     tendon("['a', 'b']", "kind = 'damper'\ndamping = 2", &[("damping", "2"), ("stiffness", "0")]);
     tendon("['a', 'b']", "kind = 'coulomb'\nforce = 2", &[("frictionloss", "2")]);
     tendon("['a', 'b']", "kind = 'inerter'\ninertance = 2", &[("armature", "2")]);
@@ -128,7 +132,7 @@ fn a_constant_force_is_an_actuator_without_a_command() {
     }
     let found = with("['a', 'b']", "kind = 'bias'\nforce = 3");
     has(&attributes(&found.text, "general", Some("e")), &[("tendon", "e"), ("biasprm", "-3 0 0")]);
-    assert!(found.text.contains("<fixed name=\"e\">"), "{}", found.text);
+    assert_names(&found.text, &["<fixed name=\"e\">"]);
 }
 
 #[test]
@@ -208,7 +212,7 @@ fn what_a_sensor_or_a_motion_cannot_be_is_told() {
     ];
     assert_eq!(told, wanted);
     // A body on prescribed motion is so heavy that nothing else moves it.
-    assert!(found.text.contains("mass=\"2000000\""), "{}", found.text);
+    assert_names(&found.text, &["mass=\"2000000\""]);
 }
 
 #[test]
@@ -265,7 +269,8 @@ fn a_urdf_robot_becomes_the_same_tree_with_the_joints_of_the_model() {
     has(&attributes(&found.text, "joint", Some("rotor")), &[("armature", "0.003")]);
     has(&attributes(&found.text, "key", Some("pose")), &[("qpos", "0 0 0.5 0")]);
     // The massless link moves, and a rotor stands beside the arm.
-    assert!(found.text.contains("mass=\"1e-9\"") && found.notes.iter().any(|note| note.contains("dummy has 1e-9 kg")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("dummy has 1e-9 kg")), "{:?}", found.notes);
+    assert_names(&found.text, &["mass=\"1e-9\""]);
     let ((names, ours), (their_names, theirs)) = (mass(URDF), mass(&found.text));
     assert_eq!(their_names[..3], names);
     assert!((theirs.view((0, 0), (3, 3)) - &ours).amax() < 1e-8 * ours.amax(), "{theirs}{ours}");
@@ -304,12 +309,8 @@ fn an_mjcf_robot_is_changed_where_its_joints_are_others_and_nowhere_else() {
     let rest: f64 = fore.iter().find(|a| a.0 == "springref").unwrap().1.parse().unwrap();
     assert!((rest - 30.0).abs() < 1e-12, "in degrees, as the file is");
     assert!(fore.iter().all(|(name, _)| name != "frictionloss" && name != "armature"), "{fore:?}");
-    assert!(
-        found.text.contains("<joint name=\"shoulder\" axis=\"0 1 0\" range=\"-90 90\" springref=\"45\" stiffness=\"3\"/>"),
-        "{}",
-        found.text
-    );
-    assert!(found.text.contains("<!-- the stand -->") && found.text.contains("<motor name=\"m\"") && found.text.contains("name=\"home\""));
+    assert_names(&found.text, &["<joint name=\"shoulder\" axis=\"0 1 0\" range=\"-90 90\" springref=\"45\" stiffness=\"3\"/>"]);
+    assert_names(&found.text, &["<!-- the stand -->", "<motor name=\"m\"", "name=\"home\""]);
     assert_eq!(mass(&found.text), (vec!["shoulder".to_string(), "fore_joint".to_string()], mass(MJCF).1));
     // Read again it is the same model.
     let again = model(&format!("[robot]\nxml = '''{}'''\n", found.text));
@@ -330,7 +331,7 @@ fn inputs_of_the_model_take_the_place_of_an_mjcfs_actuators() {
 
 #[test]
 fn what_cannot_be_exported_says_why() {
-    assert!(mjcf::export(&Model::default(), None).unwrap_err().to_string().contains("model of nothing"));
+    assert_names(mjcf::export(&Model::default(), None).unwrap_err().to_string(), &["model of nothing"]);
     let heavy = model("[bodies]\na = 0\n[[elements]]\nname = 'e'\nkind = 'inerter'\nbetween = ['a', 'ground']\ninertance = 1\n");
     assert!(mjcf::export(&heavy, None).is_ok());
 }

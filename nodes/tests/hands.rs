@@ -1,9 +1,13 @@
 //! Keys of a graph about hands: a canceller that estimates one, a master whose hand changes its grip.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 use backdrive_control::changing_grip::GripChange;
 use backdrive_control::hand::HandSettings;
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use naming::assert_names;
 use std::path::Path;
 
 /// The contact graph with a line put under the grip of its master (0) or its canceller (1).
@@ -56,7 +60,7 @@ fn what_is_wrong_with_a_hand_is_told_with_file_line_and_key() {
         (1, "grip_changes = [{ t = 2.0, scale = 1.5 }]", "grip_changes"),
     ] {
         let error = graph(of, line).unwrap_err();
-        assert!(error.contains("contact.toml:") && error.contains(told), "{line}: {error}");
+        assert_names(&error, &["contact.toml:", told]);
     }
 }
 

@@ -1,5 +1,8 @@
 //! How a node behaves when its peers do not: both clocks, over threads and over processes.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 mod common;
 
 use backdrive_control::core::{Core, Events, Port, Tick};
@@ -15,6 +18,7 @@ use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
 use backdrive_nodes::transport::{Location, Transport};
 use common::{Toy, input, node, stage, timing};
+use naming::assert_names;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::io::{BufRead, BufReader, Write};
@@ -80,7 +84,7 @@ fn a_lockstep_run_ends_when_a_peer_is_missing_and_names_it() {
     assert_eq!(watcher.missing(), ["/source/out: no publisher"]);
     let (result, told) = run(&mut watcher, Start::after(0), &Arc::default());
     match result {
-        Err(e @ RunError::PeerTimeout { .. }) => assert!(e.to_string().contains("step 2") && e.to_string().contains("/source/out"), "{e}"),
+        Err(e @ RunError::PeerTimeout { .. }) => assert_names(e.to_string(), &["step 2", "/source/out"]),
         other => panic!("{other:?}"),
     }
     assert_eq!(told[0].0, "peer_timeout");

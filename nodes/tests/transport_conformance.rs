@@ -1,5 +1,8 @@
 //! What every transport promises, instantiated for each.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Event, Gains, LAYOUT, Message, NOT_MEASURED, Sample, Status};
@@ -8,6 +11,7 @@ use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
 use backdrive_nodes::transport::ros2::{Delivery, Identity, Key, Known, Member, Network, Ros2};
 use backdrive_nodes::transport::{Location, Publisher, Subscriber, Transport, TransportError};
+use naming::assert_names;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -438,7 +442,7 @@ fn refuses_another_layout(world: &dyn World, _: &dyn World) {
     sender.send(&sample(1)).unwrap();
     let mut refused = String::new();
     assert!(eventually(world, || receiver.receive().inspect_err(|e| refused = e.to_string()).is_err()));
-    assert!(refused.contains("/arm/measured_js") && refused.contains("layout 2"), "{refused}");
+    assert_names(&refused, &["/arm/measured_js", "layout 2"]);
     assert_eq!(sequences(world, &mut receiver, 1), [1]);
 }
 

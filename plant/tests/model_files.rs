@@ -1,5 +1,8 @@
 //! Model files: what is read, what is written, and how the wrong ones are refused.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
 
@@ -7,6 +10,7 @@ use backdrive_plant::elements::{Damper, Law, Spring};
 use backdrive_plant::model::{Fragment, Hold, InputKind, Model, OutputKind};
 use backdrive_plant::parse::ModelFile;
 use backdrive_plant::write::{Edit, ElementSpec, PatchError, Value, patch, round_significant};
+use naming::assert_names;
 use skipped::skipped;
 use std::path::{Path, PathBuf};
 
@@ -296,7 +300,7 @@ fn a_patch_keeps_comments_order_and_everything_it_does_not_name() {
 
     let replaced = Edit::PutElement { element: element("cable", ["motor", "handle"], Law::Damper(Damper { damping: 1.0 })), comment: None };
     let text = patch(MASTER, &[replaced]).unwrap();
-    assert!(text.contains("kind = \"damper\"\nbetween = [\"motor\", \"handle\"]\ndamping = 1.0\n\n[[elements]]\nkind"), "{text}");
+    assert_names(&text, &["kind = \"damper\"\nbetween = [\"motor\", \"handle\"]\ndamping = 1.0\n\n[[elements]]\nkind"]);
 
     let wrong = |path: &str| patch(MASTER, &[set(path, 1.0, None)]).unwrap_err();
     assert_eq!(wrong("elements.cabel.stiffness"), PatchError::NoSuch { section: "elements".into(), name: "cabel".into() });

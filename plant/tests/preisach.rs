@@ -1,9 +1,13 @@
 //! Presliding hysteresis: the deformed Dahl model and the Preisach operator against closed forms, a grid of relays and each other.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 mod stepper_common;
 
 use backdrive_plant::model::OutputKind::{Force, Position};
 use backdrive_plant::preisach::{DahlLoop, MeasuredLoop, Operator, Relays, Transition, everett_sum, fit};
+use naming::assert_names;
 use stepper_common::*;
 
 const DAHL: DahlLoop = DahlLoop { force: 0.35, slope: 2.0 };
@@ -244,7 +248,7 @@ fn a_model_file_names_its_measured_loops_and_says_what_is_wrong_with_them() {
         ("gate = 1.5", "", "gate"),
     ] {
         let error = load(more, rows).unwrap_err().to_string();
-        assert!(error.contains("axis.toml") && error.contains(says), "{says}: {error}");
+        assert_names(&error, &["axis.toml", says]);
     }
 }
 

@@ -1,5 +1,8 @@
 //! Recordings and sets: what is read, and how the wrong ones are refused.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
 
@@ -9,6 +12,7 @@ use backdrive_plant::recording::{
 };
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
 use backdrive_plant::tomlfile::FileError;
+use naming::assert_names;
 use skipped::skipped;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -108,7 +112,7 @@ fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
     let read = |text: &str| read_text(text, Some(&["torque", "angle"]), &Columns::new(), &Piece::default());
     let told = message(read("t,torque [furlong],angle\n0,1,2\n1,2,3\n"));
     assert!(told.starts_with("x.csv:1: torque [furlong]: unknown unit \"furlong\"; known are s, ms"), "{told}");
-    assert!(told.contains("set scale for \"torque\" under [columns]"), "{told}");
+    assert_names(&told, &["\"torque\"", "[columns]"]);
     let told = message(read("t [mm],torque,angle\n0,1,2\n1,2,3\n"));
     assert_eq!(told, "x.csv:1: t [mm]: is in mm, a length (m), expected a time such as s or ms");
     let model = Model::from_toml(MOTOR, "motor.toml").unwrap();
@@ -116,7 +120,7 @@ fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
         [("t,torque [A],angle\n0,1,2\n1,2,3\n", "in A, a current (A)"), ("t,torque,angle [mm]\n0,1,2\n1,2,3\n", "in mm, a length (m)")]
     {
         let told = read(text).unwrap().check_units(&model).unwrap_err().to_string();
-        assert!(told.contains(unit) && told.contains("set scale under [columns]"), "{told}");
+        assert_names(&told, &[unit, "set scale under [columns]"]);
     }
     let dir = folder(&[("set.toml", "[columns]\nx = { column = 'y', unit = 'mmm' }\n"), ("x.csv", "t,y\n0,1\n1,2\n")]);
     let told = message(RecordingSet::open(dir.path()));
@@ -246,7 +250,7 @@ condition = { "inputs.position.offset" = "free" }
     assert_eq!(s.sessions, [("tuesday".to_string(), vec!["inputs.position.offset".to_string()])]);
     let refused = |s: &RecordingSet| s.check_conditions(&Model::default()).unwrap_err().to_string();
     let message = refused(&s);
-    assert!(message.contains("set.toml: sessions.tuesday.condition.inputs.position.offset: unknown input \"position\""), "{message}");
+    assert_names(&message, &["set.toml", "sessions.tuesday.condition.inputs.position.offset", "\"position\""]);
     let message = refused(&RecordingSet { sessions: Vec::new(), ..s.clone() });
     assert!(message.ends_with("files.a.csv.condition.elements.band.force: unknown element \"band\"; there is none here"), "{message}");
     assert_eq!(RecordingSet::open(&dir.path().join("set.toml")).unwrap(), s);
@@ -275,8 +279,8 @@ files.fast = { of = "log.csv", where = { run = 2 } }
         let dir = folder(&[("set.toml", set), ("log.csv", log), ("notes.txt", "")]);
         message(RecordingSet::open(dir.path()))
     };
-    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"lag.csv\" }").contains("there is no file \"lag.csv\""));
-    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"notes.txt\" }").contains("\"notes.txt\" is not a recording"));
+    assert_names(refused("fit = [\"slow\"]\nfiles.slow = { of = \"lag.csv\" }"), &["lag.csv"]);
+    assert_names(refused("fit = [\"slow\"]\nfiles.slow = { of = \"notes.txt\" }"), &["notes.txt"]);
 }
 
 #[test]

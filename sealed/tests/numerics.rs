@@ -1,5 +1,8 @@
 //! Convergence, determinism, sensors.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 mod common;
 
 use backdrive_sealed::effects::{Physics, Site};
@@ -7,6 +10,7 @@ use backdrive_sealed::laws::*;
 use backdrive_sealed::plant::SealedPlant;
 use backdrive_sealed::truth::{Sensor, Truth};
 use common::*;
+use naming::assert_names;
 
 fn everything() -> (backdrive_sealed::network::Network, Truth) {
     let network = held("plant/models/impulse-engine-linear.toml");
@@ -99,8 +103,8 @@ fn noise_has_its_size_and_an_encoder_its_steps() {
 fn wrong_inputs_are_refused_and_change_nothing() {
     let (network, truth) = everything();
     let mut plant = SealedPlant::new(&network, &truth, 2e-4).unwrap();
-    assert!(plant.step(&[1.0]).unwrap_err().to_string().contains("1 inputs were given, the device has 2"));
-    assert!(plant.step(&[1.0, f64::NAN]).unwrap_err().to_string().contains("input 1 is not a finite number"));
+    assert_names(plant.step(&[1.0]).unwrap_err().to_string(), &["1 inputs", "has 2"]);
+    assert_names(plant.step(&[1.0, f64::NAN]).unwrap_err().to_string(), &["input 1"]);
     let mut untouched = SealedPlant::new(&network, &truth, 2e-4).unwrap();
     assert_eq!(record(&mut plant), record(&mut untouched));
 }

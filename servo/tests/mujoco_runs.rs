@@ -2,6 +2,9 @@
 //!
 //! `BACKDRIVE_PYTHON` names a Python that has `tests/python/requirements.txt`. Without it the test is skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 #[path = "../../tests/common/python.rs"]
 mod python;
 
@@ -10,6 +13,7 @@ use backdrive_plant::model::Model;
 use backdrive_servo::gravity;
 use backdrive_servo::record::Record;
 use backdrive_servo::simulate::simulate;
+use naming::assert_names;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
@@ -100,5 +104,6 @@ fn a_robot_without_a_known_gain_is_written_joint_by_joint() {
     std::fs::write(folder.path().join("arm.urdf"), ARM).unwrap();
     let exported = mjcf::export(&model(&WEIGHED.replace("gravity = 0.07", ""), folder.path()), None).unwrap();
     assert!(exported.left_out.iter().any(|l| l.kind == "links"), "{:?}", exported.left_out);
-    assert!(exported.text.contains("biasprm=\"0.01 -1 0\"") && !exported.text.contains("upper"), "{}", exported.text);
+    assert!(!exported.text.contains("upper"), "{}", exported.text);
+    assert_names(&exported.text, &["biasprm=\"0.01 -1 0\""]);
 }

@@ -1,11 +1,15 @@
 //! The papers' stories: with BACKDRIVE_LONG=1 the first step of each in its short form, the whole path where BACKDRIVE_STUDIES is 1.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
 
 use backdrive_studies::data::Data;
 use backdrive_studies::study_named;
 use backdrive_studies::table::Report;
+use naming::assert_names;
 use skipped::skipped;
 
 fn long() -> bool {
@@ -49,7 +53,7 @@ fn the_ball_screw_remembers_every_reversal() {
     let Some(report) = report("paper_000") else { return };
     // Four sliders do not reach the noise of a device that has seven: it may be claimed or be the nearest.
     let said = report.word_named("effects-1");
-    assert!(said.contains("maxwell_slip at screw-ground"), "{said}");
+    assert_names(&said, &["maxwell_slip at screw-ground"]);
     falls(&report, 0.3);
 }
 

@@ -2,12 +2,16 @@
 //! The short parts of those that take seconds; with BACKDRIVE_LONG=1 the short parts of all, with BACKDRIVE_STUDIES=1 whole studies, which take up to
 //! a quarter of an hour together.
 
+#[path = "../../tests/common/naming.rs"]
+mod naming;
+
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
 
 use backdrive_studies::data::Data;
 use backdrive_studies::table::Report;
 use backdrive_studies::{StudyError, study_named};
+use naming::assert_names;
 use skipped::skipped;
 use std::sync::Mutex;
 
@@ -112,7 +116,7 @@ fn emps_from_its_published_models() {
 #[test]
 fn silverbox_has_a_cubic_spring_that_holds_beyond_what_was_fitted() {
     let Some(report) = report_of_a_search("silverbox") else { return };
-    assert!(report.word_named("verdict").contains("cubic_spring at mass-ground"), "{}", report.word_named("verdict"));
+    assert_names(report.word_named("verdict"), &["cubic_spring at mass-ground"]);
     // A search with time enough finds a one-sided law too, which takes a part of the hardening.
     let near = 0.05;
     assert!((report.figure_named("cubic stiffness") / 3.949 - 1.0).abs() < near, "{}", report.figure_named("cubic stiffness"));
@@ -126,7 +130,8 @@ fn the_robot_s_encoders_are_read_at_different_times() {
     let Some(report) = report_of_a_search("kuka_kr300") else { return };
     for axis in if long() { 1..=3 } else { 1..=1 } {
         let verdict = report.word_named(&format!("axis-{axis}"));
-        assert!(verdict.contains("delay at") && !verdict.contains("series_compliance"), "{axis}: {verdict}");
+        assert!(!verdict.contains("series_compliance"), "{axis}: {verdict}");
+        assert_names(&verdict, &["delay at"]);
         let skew = report.figure_named(&format!("axis-{axis} skew"));
         assert!((2.3..3.6).contains(&skew), "{axis}: {skew}");
         let [before, after] = ["before", "after"].map(|when| report.figure_named(&format!("axis-{axis} arm_angle {when}")));
@@ -137,7 +142,7 @@ fn the_robot_s_encoders_are_read_at_different_times() {
 #[test]
 fn the_motor_cogs_seven_times_a_turn() {
     let Some(report) = report("odrive_cogging") else { return };
-    assert!(report.word_named("round-1").contains("cogging at"), "{}", report.word_named("round-1"));
+    assert_names(report.word_named("round-1"), &["cogging at"]);
     let harmonic = report.figure_named("harmonic 1");
     assert!((harmonic - 7.0).abs() < 0.2, "{harmonic}");
     let amplitude = report.figure_named("amplitude 1");
@@ -177,7 +182,8 @@ fn the_teleoperator_s_dead_gauge_is_told_and_its_levers_rub() {
     let Some(report) = report_of_a_search("tue_bilateral") else { return };
     // The audit names the gauge at its rail, and does not call the one dead that only moves little.
     let gauges = report.word_named("master gauges");
-    assert!(gauges.contains("gauge_a") && !gauges.contains("gauge_b"), "{gauges}");
+    assert!(!gauges.contains("gauge_b"), "{gauges}");
+    assert_names(&gauges, &["gauge_a"]);
     assert_eq!(report.word_named("slave gauges"), "nothing");
     for (gain, stiffness) in [("a", 8.0), ("b", 15.0), ("c", 25.0)] {
         let found = report.figure_named(&format!("coupling {gain}"));

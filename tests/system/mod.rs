@@ -2,6 +2,9 @@
 
 #![allow(dead_code)] // each test program uses its own part
 
+#[path = "../common/naming.rs"]
+pub mod naming;
+
 use backdrive_bags::Reader;
 use backdrive_msgs::{Message, Sample};
 use std::fs::File;
@@ -9,6 +12,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+pub use naming::assert_names;
+
+/// What Rust writes where a program panics.
+pub const PANIC: &str = "panicked";
 
 /// How long anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(90);
@@ -46,6 +54,20 @@ pub struct Ended {
 impl Ended {
     pub fn json(&self) -> serde_json::Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("no JSON ({e}): {self:?}"))
+    }
+
+    /// It ended with this code, and its messages on standard error name these.
+    #[track_caller]
+    pub fn ends(&self, code: i32, named: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert_names(&self.stderr, named);
+    }
+
+    /// It ended with this code, and its answer on standard output names these.
+    #[track_caller]
+    pub fn answers(&self, code: i32, named: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert_names(&self.stdout, named);
     }
 }
 

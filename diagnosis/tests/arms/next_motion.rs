@@ -1,6 +1,7 @@
 //! The planned motion determines what the logs leave open, and a stated payload counts.
 
 use crate::common::{AS_STATED, Beside, TIP, along, series, set, write};
+use crate::naming::assert_names;
 use backdrive_diagnosis::arms::diagnose::{Found, diagnose};
 use backdrive_diagnosis::arms::problem::Problem;
 use backdrive_diagnosis::hypothesis::Place;
@@ -122,5 +123,5 @@ fn a_payload_of_no_link_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     set(folder.path(), &AS_STATED, "[files.\"a.csv\"]\npayload = { mass = 1.0, at = [0, 0, 0], link = \"hand\" }\n", |_| {});
     let error = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap_err().to_string();
-    assert!(error.contains("files.a.csv.payload") && error.contains("no link \"hand\"; it has base, upper"), "{error}");
+    assert_names(&error, &["files.a.csv.payload", "\"hand\"", "base, upper"]);
 }
