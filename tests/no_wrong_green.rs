@@ -41,7 +41,7 @@ fn a_bag_that_was_cut_before_the_contact_is_not_stable() {
     cut(&place, "run.mcap", "cut.mcap", 200_000);
     let found = ask(&place, "cut.mcap", &["--gain", "60"]);
     assert_eq!(found["verdict"], "cannot_tell", "{found}");
-    assert_eq!(found["methods"]["recording"]["outcome"]["why"], "no_contact", "{found}");
+    assert_eq!(found["methods"]["recording"]["outcome"]["why"], "cut_short", "{found}");
     assert!(found["advice"].is_string() && found["critical_gain"].is_null(), "{found}");
     let text = place.backdrive(&["stability", "cut.mcap", "--gain", "60"]);
     text.answers(7, &["CANNOT_TELL"]);
