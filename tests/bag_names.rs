@@ -22,7 +22,7 @@ fn a_bag_that_exists_is_replaced_only_when_that_is_asked_for() {
         let whole = std::fs::read(place.path(&bag)).unwrap();
         let told = place.backdrive(&[&run[..], &[&bag]].concat());
         assert_eq!(told.code, Some(3), "{told:?}");
-        assert_names(&told.stderr, &["--overwrite", "run.mcap"]);
+        assert_names(&told.stderr, &["--overwrite", &bag]);
         assert_eq!(std::fs::read(place.path(&bag)).unwrap(), whole);
         let again = place.backdrive(&[&run[..], &[&bag, "--overwrite", "--seed", "5"]].concat());
         assert!(matches!(again.code, Some(0 | 7)), "{again:?}");
