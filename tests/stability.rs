@@ -257,7 +257,8 @@ fn the_report_is_one_file_and_a_sweep_has_every_gain() {
     assert!(sweep.iter().any(|p| p["verdict"] != "stable"));
     assert_eq!(found["grips"].as_array().unwrap().len(), 1, "the grip as it is belongs to the edge itself");
     let page = std::fs::read_to_string(place.path("r.html")).unwrap();
-    for part in ["Nyquist", "coherence", "Verdict over the loop gain", "energy", "What to do now", "× 1 (as recorded)", "application/json"] {
+    for part in ["Nyquist", "coherence", "Verdict over the loop gain", "energy", "What to do now", "× 1 (as recorded)", "application/json"]
+    {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.replace("http://www.w3.org/", "").contains("http"), "nothing is fetched");
