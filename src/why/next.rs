@@ -122,7 +122,7 @@ fn changes(words: &[String]) -> Option<Overrides> {
 
 fn sentence(remedy: &Remedy) -> String {
     let hands = match remedy.robust {
-        true => "also with a grip 15 % softer or stiffer and with 25 % more gain",
+        true => "also with 0.7 to 1.5 times the grip, on walls of 0.5 to 2 times the stiffness, and with 25 % more gain",
         false => "with this grip and this gain only",
     };
     let throws = remedy.throws.as_ref().map_or_else(String::new, |throw| format!("; {throw}"));

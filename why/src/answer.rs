@@ -9,7 +9,7 @@ use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
 use crate::options::{Named, options};
-use crate::remedy::{Remedy, remedies};
+use crate::remedy::{Remedy, doubts, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
@@ -225,11 +225,13 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     let mut shakes_again = answer.reproduced || !run.outcome.is_stable();
     // A limit hides what happens beneath: then the causes are looked for without it.
     let (mut loop_of_causes, mut always, mut happening) = (was.clone(), Vec::new(), answer.happening);
+    let mut does = run.outcome;
     if let Happening::Saturation { .. } = happening {
         let mut unlimited = was.clone();
         Change::NoLimits.apply(&mut unlimited);
         let run = unlimited.run(&hand, *gain, &RunOptions::default(), cancel)?;
         let beneath = Happening::of_run(&run);
+        does = if beneath.is_trouble() { run.outcome } else { does };
         if beneath.is_trouble() {
             (loop_of_causes, always, happening) = (unlimited, vec![Change::NoLimits], beneath);
             shakes_again = true;
@@ -237,9 +239,12 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         answer.beneath = Some(beneath);
     }
     answer.edge = loop_of_causes.edge(&hand, gain.product(), cancel)?.critical_gain;
-    if !answer.happening.is_trouble() {
+    // A loop that was not judged, because of what differs from its graph: what would it do without that?
+    let kept_from_judgement = matches!(answer.happening, Happening::NotJudged { .. }) && !answer.differences.is_empty();
+    if !answer.happening.is_trouble() && !kept_from_judgement {
         return Ok(());
     }
+    shakes_again |= kept_from_judgement;
     hear("without each suspect");
     let asked = Asked {
         graph,
@@ -248,6 +253,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         hand: &hand,
         gain: *gain,
         happening: &happening,
+        again: &does,
         always: &always,
         edge: answer.edge,
         reproduced: answer.reproduced,
@@ -259,7 +265,8 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         return Ok(());
     }
     hear("trying remedies");
-    answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, &answer.causes, cancel)?;
+    let unsure = doubts(&answer.differences);
+    answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, (&answer.causes, &unsure), cancel)?;
     Ok(())
 }
 
@@ -283,6 +290,7 @@ fn of_events(answer: &mut Answer, recorded: &Recorded) {
         without: "not re-simulated: it is not part of a model".to_string(),
         holds_without: false,
         edge_without: None,
+        share: None,
         seen: true,
         confidence: 0.0,
         repairs: Vec::new(),

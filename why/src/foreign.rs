@@ -116,7 +116,7 @@ fn measured(session: &Session, gain: Gain) -> (Measured, Vec<String>) {
 
 fn cause(kind: CauseKind, place: String, evidence: String, holds_without: bool) -> Cause {
     let without = "not re-simulated: no model of the loop is known".to_string();
-    Cause { kind, place, evidence, without, holds_without, edge_without: None, seen: true, confidence: 0.0, repairs: Vec::new() }
+    Cause { kind, place, evidence, without, holds_without, edge_without: None, share: None, seen: true, confidence: 0.0, repairs: Vec::new() }
 }
 
 /// What an axis' signals say of its two ways: from the master's position to the command, and from the contact force to the master.
@@ -150,6 +150,19 @@ fn of_axis(axis: &AxisSignals, session: &Session, gain: Gain, happening: &Happen
                 all.push((at(CauseKind::DeadSensor, text), 6.0));
             }
             AsIf::Railed { .. } => all.push((at(CauseKind::Saturation, format!("{what} saturates, while {of} moves on")), 2.0)),
+            AsIf::Held { rows, .. } => {
+                let (hz, loop_hz) = (1.0 / (rows * session.period_s), 1.0 / session.period_s);
+                let text = format!("{what} is renewed at {hz:.1} Hz only, and {of} at {loop_hz:.0} Hz");
+                // Held values are half a renewal late on average.
+                let share = happening.frequency_hz().map_or(0.5, |f| (f / hz).min(3.0));
+                all.push((at(CauseKind::Rate, text), share));
+            }
+            AsIf::Filtered { corner_hz, .. } => {
+                let text = format!("{what} is {of} behind a low-pass of {corner_hz:.1} Hz");
+                // Its lag is an eighth of a period at the corner.
+                let share = happening.frequency_hz().map_or(0.5, |f| (f / corner_hz).min(3.0));
+                all.push((at(CauseKind::FilterLag, text), share));
+            }
             AsIf::Unsteady { .. } | AsIf::Changed { .. } | AsIf::Stepped { .. } | AsIf::Noisy { .. } | AsIf::Same | AsIf::Otherwise => {}
         }
     }

@@ -64,6 +64,11 @@ fn of(change: &Change, named: &Named) -> Option<Vec<Word>> {
         Change::WayRepaired { .. }
         | Change::Delays { .. }
         | Change::SensorRepaired { .. }
+        | Change::NumberRepaired { .. }
+        | Change::DeviceRepaired { .. }
+        | Change::Wall { .. }
+        | Change::Renewals { .. }
+        | Change::Interpolated
         | Change::FinerSensors
         | Change::Damping { .. }
         | Change::FrictionCompensated { .. }
