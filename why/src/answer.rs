@@ -6,6 +6,7 @@ use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::difference::Difference;
 use crate::differences::{Differences, Look, differences};
+use crate::follower::explained;
 use crate::happening::Happening;
 use crate::named::named;
 use crate::options::{Named, options};
@@ -13,6 +14,7 @@ use crate::remedy::{Remedy, doubts, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_nodes::stage::Clock;
 use backdrive_stability::bag_gate::models_apart;
 use backdrive_stability::by_itself::alone::AloneError;
 use backdrive_stability::by_itself::compared::SMALL;
@@ -111,7 +113,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let contradictory = happening == Happening::NotJudged { why: Unjudged::Contradictory };
     let is_lossy = matches!(happening, Happening::NotJudged { why } if why.is_loss());
     let patience = if is_lossy { Duration::ZERO } else { question.patience };
-    let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience }, hear, cancel)?;
+    let Differences { found, notes } = differences(graph, recorded, &Look { small: small(graph, &happening), patience }, hear, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),
         gain: gain.product(),
@@ -136,6 +138,14 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         of_events(&mut answer, recorded);
         return Ok(answer);
     }
+    if let Happening::FollowerStairs { .. } = answer.happening {
+        hear("the follower on its recorded commands");
+        let was = as_recorded(graph, &answer.differences);
+        (answer.causes, answer.remedies, answer.reproduced) = explained(graph, was, &answer.differences, recorded, &answer.happening);
+        answer.again = Some(if answer.reproduced { "the follower by itself goes in such stairs" } else { "the follower by itself goes smoothly" }.into());
+        of_events(&mut answer, recorded);
+        return Ok(answer);
+    }
     match again(question, &mut answer, hear, cancel) {
         Ok(()) => {}
         Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
@@ -156,6 +166,13 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     }
     Ok(answer)
 }
+
+/// A difference that counts, as a share of its signal. In lockstep nothing is left to chance: where something shakes, a smaller difference is one too.
+fn small(graph: &Graph, happening: &Happening) -> f64 {
+    if happening.is_trouble() && graph.timing.clock == Clock::Lockstep { IN_LOCKSTEP * SMALL } else { SMALL }
+}
+
+const IN_LOCKSTEP: f64 = 0.25;
 
 /// A device with what holds it, as a model file.
 fn held(files: &DeviceFiles) -> Option<String> {

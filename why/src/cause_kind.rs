@@ -22,6 +22,8 @@ pub enum CauseKind {
     Compliance,
     /// Dry friction that was left out.
     DryFriction,
+    /// Dry friction in the follower that makes it go in stairs.
+    Stiction,
     /// Backlash that was left out.
     Backlash,
     /// Hysteresis that was left out.
@@ -72,6 +74,7 @@ impl CauseKind {
             CauseKind::Inertia => "inertia that is missing from the canceller's model",
             CauseKind::Compliance => "compliance that is missing from the canceller's model",
             CauseKind::DryFriction => "dry friction that is missing from the model",
+            CauseKind::Stiction => "stiction in the follower",
             CauseKind::Backlash => "backlash that is missing from the model",
             CauseKind::Hysteresis => "hysteresis that is missing from the model",
             CauseKind::OtherPhysics => "the master differs from the canceller's model",

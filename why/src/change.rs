@@ -1,6 +1,7 @@
 //! Changes to a loop that would stop it, as things that can be done to any graph.
 
 use crate::coupled::couple;
+use crate::faulty::{Distortion, Side};
 use crate::knob::Knob;
 use crate::trial::Trial;
 use backdrive_control::coupling::LawKind;
@@ -10,6 +11,8 @@ use backdrive_diagnosis::physics::physics_named;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::{Element, Fragment, Model};
+use backdrive_stability::by_itself::recorded::Quantity;
+use backdrive_stability::outcome::Unit;
 use backdrive_stability::resimulate::grip;
 use serde::Serialize;
 
@@ -96,6 +99,29 @@ pub enum Change {
     },
     /// Signals that are renewed too seldom go on a straight line to each new value instead of a step.
     Interpolated,
+    /// A stiffer servo of the follower.
+    Servo {
+        /// Factor on its forces.
+        factor: f64,
+    },
+    /// The follower's command leads on the side to which it moves, by what its sliding friction bends its servo.
+    FeedForward {
+        /// m or rad.
+        by: f64,
+        /// Which of them.
+        unit: Unit,
+    },
+    /// A sine on the follower's command.
+    Dither {
+        /// Amplitude, m or rad.
+        by: f64,
+        /// Hz.
+        hz: f64,
+        /// Unit of the amplitude.
+        unit: Unit,
+    },
+    /// The follower without its dry friction: not to be had, but it shows what the friction does.
+    FollowerWithoutFriction,
     /// What the slave touches is stiffer or softer.
     Wall {
         /// Factor on its forces.
@@ -173,6 +199,12 @@ impl Change {
             Change::SensorRepaired { node } => trial.distortions.retain(|d| d.node != *node),
             Change::NumberRepaired { node, knob, value } => device(&mut trial.graph, node, |files| knob.undo(files, *value)),
             Change::DeviceRepaired { node, files: stated, .. } => device(&mut trial.graph, node, |files| *files = (**stated).clone()),
+            Change::Servo { factor } => followers(&mut trial.graph, |files| Knob::Servo.put(files, *factor)),
+            Change::FollowerWithoutFriction => followers(&mut trial.graph, |files| {
+                files.model.iter_mut().for_each(|m| m.elements.retain(|e| !is_friction_to_ground(e)));
+            }),
+            Change::FeedForward { by, .. } => commanded(trial, |d| d.lead = *by),
+            Change::Dither { by, hz, .. } => commanded(trial, |d| d.dither = [*by, *hz]),
             Change::Renewals { factor, .. } => {
                 for hold in trial.distortions.iter_mut().filter_map(|d| d.hold.as_mut()) {
                     hold.rows = (hold.rows / factor).max(1.0);
@@ -232,6 +264,12 @@ impl Change {
         }
     }
 
+    /// Whether it puts right what was found to differ from the graph, and does nothing else.
+    pub fn is_repair(&self) -> bool {
+        use Change::*;
+        matches!(self, WayRepaired { .. } | SensorRepaired { .. } | NumberRepaired { .. } | DeviceRepaired { .. })
+    }
+
     /// Whether it does the same as another, however the two are called.
     pub fn does_the_same(&self, other: &Change) -> bool {
         match (self, other) {
@@ -270,6 +308,12 @@ impl std::fmt::Display for Change {
             Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
             Change::NumberRepaired { node, knob, .. } => write!(f, "{}", knob.repair(node)),
             Change::DeviceRepaired { node, what, .. } => write!(f, "repair {node}: {what}"),
+            Change::Servo { factor } => write!(f, "make the follower's servo {factor:.0} times as stiff"),
+            Change::FeedForward { by, unit } => {
+                write!(f, "let the follower's command lead by {} on the side to which it moves: a feed-forward of its sliding friction", unit.text(*by))
+            }
+            Change::Dither { by, hz, unit } => write!(f, "add a dither of {} at {hz:.0} Hz to the follower's command", unit.text(*by)),
+            Change::FollowerWithoutFriction => write!(f, "remove the follower's dry friction"),
             Change::Renewals { hz, .. } => write!(f, "renew the signal that is held at {hz:.0} Hz"),
             Change::Interpolated => write!(f, "interpolate the held signal on a straight line to each new value, instead of a step"),
             Change::Wall { factor } => write!(f, "touch something {factor:.1} times as stiff"),
@@ -289,6 +333,27 @@ impl std::fmt::Display for Change {
             Change::StrongerMotor => write!(f, "use a stronger motor"),
         }
     }
+}
+
+fn followers(graph: &mut Graph, change: impl Fn(&mut DeviceFiles)) {
+    for node in &mut graph.nodes {
+        if let Settings::Slave(files) = &mut node.settings {
+            change(files);
+        }
+    }
+}
+
+/// Puts a distortion on the command of each axis of each slave.
+fn commanded(trial: &mut Trial, change: impl Fn(&mut Distortion)) {
+    let slaves = trial.graph.nodes.iter().filter(|n| n.kind == NodeKind::Slave);
+    let all: Vec<Distortion> = slaves
+        .flat_map(|node| (0..node.axes).map(|axis| Distortion { side: Side::Input(0), ..Distortion::none(&node.name, Quantity::Position, axis) }))
+        .map(|mut one| {
+            change(&mut one);
+            one
+        })
+        .collect();
+    trial.distortions.extend(all);
 }
 
 /// Changes the files of a master or a slave.

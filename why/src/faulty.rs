@@ -8,6 +8,7 @@ use backdrive_stability::by_itself::recorded::Quantity;
 use backdrive_stability::by_itself::shapes::{Filter, Renewal};
 use serde::Serialize;
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 
 /// Which side of a node a signal is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -33,6 +34,10 @@ pub struct Distortion {
     pub axis: usize,
     /// Factor.
     pub gain: f64,
+    /// What is added on the side to which the signal moves, in its unit: a feed-forward of dry friction; 0 for none.
+    pub lead: f64,
+    /// A sine that is added: amplitude in the signal's unit, and Hz.
+    pub dither: [f64; 2],
     /// A low-pass.
     pub filter: Option<Filter>,
     /// A rate of its own at which it is renewed.
@@ -61,6 +66,8 @@ impl Distortion {
             quantity,
             axis,
             gain: 1.0,
+            lead: 0.0,
+            dither: [0.0, 0.0],
             filter: None,
             hold: None,
             ramps: false,
@@ -77,6 +84,10 @@ impl Distortion {
 struct Signal {
     how: Distortion,
     filter: Option<Butterworth>,
+    period_s: f64,
+    /// The value before, and to which side it moved last.
+    raw: f64,
+    side: f64,
     held: f64,
     /// The value before the held one, and the step of the last renewal.
     before: f64,
@@ -89,13 +100,18 @@ struct Signal {
 impl Signal {
     fn new(how: &Distortion, period_s: f64, seed: u64) -> Signal {
         let filter = how.filter.map(|f| Butterworth::new(f.order, f.corner_hz, period_s));
-        Signal { how: how.clone(), filter, held: f64::NAN, before: f64::NAN, renewed: 0, past: VecDeque::with_capacity(how.late + 1), last: f64::NAN, seed }
+        Signal { how: how.clone(), period_s, raw: f64::NAN, side: 0.0, filter, held: f64::NAN, before: f64::NAN, renewed: 0, past: VecDeque::with_capacity(how.late + 1), last: f64::NAN, seed }
     }
 
     /// What becomes of a value at a step.
     fn pass(&mut self, value: f64, step: u64) -> f64 {
         let how = &self.how;
-        let mut value = how.gain * value;
+        if value != self.raw && self.raw.is_finite() {
+            self.side = (value - self.raw).signum();
+        }
+        self.raw = value;
+        let [swing, hz] = how.dither;
+        let mut value = how.gain * value + how.lead * self.side + swing * (TAU * hz * step as f64 * self.period_s).sin();
         if let Some(filter) = self.filter.as_mut().filter(|_| value.is_finite()) {
             value = filter.step(value);
         }
@@ -227,6 +243,10 @@ mod tests {
         assert_eq!(out(Distortion { hold, ..none.clone() }), [0.0, 1.0, 1.0, 3.0, 3.0, 3.0, 6.0, 6.0, 8.0, 8.0]);
         let ramps = out(Distortion { hold: Some(Renewal { rows: 2.0, phase: 0.0 }), ramps: true, ..none.clone() });
         assert_eq!(ramps, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], "smooth, and one renewal late");
+        let led = out(Distortion { lead: 0.5, ..none.clone() });
+        assert_eq!(led[..3], [0.0, 1.5, 2.5]);
+        let swung = out(Distortion { gain: 0.0, dither: [2.0, 250.0], ..none.clone() });
+        assert!((swung[1] - 2.0).abs() < 1e-9 && swung[2].abs() < 1e-9 && (swung[3] + 2.0).abs() < 1e-9, "{swung:?}");
         let slow = out(Distortion { filter: Some(Filter { order: 1, corner_hz: 1.0 }), ..none.clone() });
         assert!(slow.windows(2).all(|w| w[1] > w[0]) && slow[9] < 0.5, "{slow:?}");
         let noisy = out(Distortion { gain: 0.0, noise: 1.0, ..none });

@@ -15,6 +15,7 @@ pub mod differences;
 pub mod faulty;
 #[cfg(test)]
 mod fixtures;
+mod follower;
 pub mod foreign;
 pub mod happening;
 pub mod knob;

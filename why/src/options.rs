@@ -67,6 +67,10 @@ fn of(change: &Change, named: &Named) -> Option<Vec<Word>> {
         | Change::NumberRepaired { .. }
         | Change::DeviceRepaired { .. }
         | Change::Wall { .. }
+        | Change::Servo { .. }
+        | Change::FeedForward { .. }
+        | Change::Dither { .. }
+        | Change::FollowerWithoutFriction
         | Change::Renewals { .. }
         | Change::Interpolated
         | Change::FinerSensors

@@ -93,7 +93,11 @@ pub fn remedies(
     cancel: &AtomicBool,
 ) -> Result<Vec<Remedy>, ResimulateError> {
     let free = free_motion(was, hand, gain, cancel)?;
-    let tried = candidates(was, gain, edge, causes);
+    let mut tried = candidates(was, gain, edge, causes);
+    // Of a loop that was not judged it is only known that what differs is to be put right.
+    if causes.iter().all(|c| c.kind != CauseKind::GainTooHigh) {
+        tried.retain(|(changes, repairs)| *repairs && changes.iter().all(Change::is_repair));
+    }
     let one = |(changes, repairs_cause): &(Vec<Change>, bool)| -> Result<Option<Remedy>, ResimulateError> {
         let mut trial = was.clone();
         changes.iter().for_each(|c| c.apply(&mut trial));

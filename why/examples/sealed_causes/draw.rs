@@ -75,6 +75,8 @@ pub fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<
             let bears = fast.edge(&hand_of(&fast.graph), 1.0, &NEVER).ok()?.critical_gain.unwrap_or(20.0);
             bears * between(0.3, 0.7)
         }
+        // Play and low-passes of the follower matter near the limit only.
+        _ if ["slave play", "slave friction", "low-pass"].into_iter().any(has) => base_edge * between(0.4, 0.9),
         _ => base_edge * between(0.15, 0.6),
     };
     let declared = graph(&text, lambda.min(8.0));
