@@ -13,7 +13,7 @@ use crate::options::{Named, options};
 use crate::remedy::{Remedy, doubts, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
-use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_nodes::stage::Clock;
 use backdrive_stability::bag_gate::models_apart;
 use backdrive_stability::by_itself::alone::AloneError;
@@ -92,6 +92,9 @@ pub struct Answer {
     pub master: Option<String>,
     /// The critical mu*lambda of the recorded loop; `None` where there is none within a factor of 20.
     pub edge: Option<f64>,
+    /// The slave as found, where it differs from the graph and touches what the graph states: a model file.
+    #[serde(skip)]
+    pub slave: Option<String>,
     /// Why the loop was not re-simulated, where it was not.
     pub not_again: Option<String>,
     /// Events that nodes reported while it ran, kinds with their counts.
@@ -123,7 +126,8 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         beneath: None,
         remedies: Vec::new(),
         differs: found.iter().map(|d| named(d, graph).2).collect(),
-        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
+        master: of_device(&found, NodeKind::Master).and_then(held),
+        slave: of_device(&found, NodeKind::Slave).and_then(|files| alone_in(graph, files)),
         again: None,
         again_signals: None,
         reproduced: false,
@@ -174,6 +178,17 @@ fn small(graph: &Graph, happening: &Happening) -> f64 {
 
 const IN_LOCKSTEP: f64 = 0.25;
 
+/// The device of a kind as found, where it differs from the graph.
+fn of_device(found: &[Difference], kind: NodeKind) -> Option<&DeviceFiles> {
+    found.iter().filter(|d| d.kind == kind).find_map(|d| d.device.as_ref()?.files.as_deref())
+}
+
+/// A slave as a model file; `None` where what it touches differs too.
+fn alone_in(graph: &Graph, files: &DeviceFiles) -> Option<String> {
+    let stated = graph.nodes.iter().find_map(|n| if let Settings::Slave(stated) = &n.settings { Some(stated) } else { None })?;
+    (stated.fragment == files.fragment).then(|| files.model.as_ref().map(backdrive_plant::model::Model::to_toml)).flatten()
+}
+
 /// A device with what holds it, as a model file.
 fn held(files: &DeviceFiles) -> Option<String> {
     let model = files.model.as_ref()?;
@@ -210,7 +225,8 @@ fn closer(
     }
     let mut other = Answer {
         differs: found.iter().map(|d| named(d, question.graph).2).collect(),
-        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
+        master: of_device(&found, NodeKind::Master).and_then(held),
+        slave: of_device(&found, NodeKind::Slave).and_then(|files| alone_in(question.graph, files)),
         differences: found,
         causes: Vec::new(),
         remedies: Vec::new(),

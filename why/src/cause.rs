@@ -94,6 +94,13 @@ const GAIN_BESIDE: f64 = 0.4;
 pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, ResimulateError> {
     let suspects = suspects(asked);
     let gain = asked.gain.product();
+    // Several things may shake a loop each by itself: then it goes on without any one of them, and holds without all.
+    let seen = suspects.iter().filter(|s| s.seen).count();
+    let holds_without_all = seen > 1 && {
+        let mut none = Trial::of(asked.graph.clone());
+        asked.always.iter().for_each(|c| c.apply(&mut none));
+        none.run(asked.hand, asked.gain, &RunOptions::default(), cancel)?.outcome.is_stable()
+    };
     let judged: Vec<(Cause, f64)> = suspects
         .into_par_iter()
         .map(|mut suspect| {
@@ -107,6 +114,8 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
                 true => edge.map_or(FURTHER, |e| (e / gain).clamp(1.0, FURTHER)),
                 false => taken_along(asked.happening, &run.outcome).filter(|share| *share >= MOST_OF_IT).unwrap_or(NO_EVIDENCE),
             };
+            let share = share_of(asked, &run.outcome);
+            let further = if suspect.seen && holds_without_all { further.max(MOST_OF_IT + 0.5 * share) } else { further };
             let weight = further * if suspect.seen { SEEN } else { 1.0 };
             let cause = Cause {
                 kind: suspect.kind,
@@ -115,7 +124,7 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
                 without: run.outcome.to_string(),
                 holds_without: holds,
                 edge_without: edge,
-                share: asked.shakes_again.then(|| share_of(asked, &run.outcome)),
+                share: asked.shakes_again.then_some(share),
                 seen: suspect.seen,
                 confidence: 0.0,
                 repairs: suspect.repairs,
@@ -192,6 +201,9 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         kind: CauseKind::GainTooHigh,
         place: String::new(),
         evidence: match lowered {
+            Some(edge) if !asked.differences.is_empty() => {
+                format!("with everything that differs from the graph the loop is stable only up to mu*lambda = {edge:.3}")
+            }
             Some(edge) => format!("every node behaves as the graph states, and that loop is stable only up to mu*lambda = {edge:.3}"),
             None => "the loop of the graph oscillates at this gain".to_string(),
         },

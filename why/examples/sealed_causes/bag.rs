@@ -1,23 +1,23 @@
 //! The bag of a hidden loop, and what is said of it by who has nothing else.
 
-use crate::draw::Case;
 use backdrive_bags::Recorder;
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_nodes::build::{plan, plan_with};
-use backdrive_nodes::graph::NodeKind;
+use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_why::answer::Answer;
 use backdrive_why::recording::Recording;
+use backdrive_why::trial::Trial;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Records the hidden loop; the bag holds the graph that was declared.
-pub fn record(case: &Case, bag: &Path) {
-    let mut declared = case.declared.clone();
+pub fn record(declared: &Graph, truth: &Trial, bag: &Path) {
+    let mut declared = declared.clone();
     declared.overwrite = true;
-    let graph = &case.truth.graph;
-    let own = case.truth.cores();
+    let graph = &truth.graph;
+    let own = truth.cores();
     let nodes = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder);
     let plans = nodes.map(|n| match own.as_ref().and_then(|own| own(graph, n, 1.0)) {
         Some(cores) => plan_with(graph, &n.name, cores.expect("cores")).expect("a node"),

@@ -65,7 +65,7 @@ fn main() {
                 println!("{index:3} {kind:<16} could not be drawn");
                 return None;
             };
-            record(&case, &folder.join(format!("{index:03}.mcap")));
+            record(&case.declared, &case.truth, &folder.join(format!("{index:03}.mcap")));
             Some((index, case))
         })
         .collect();
