@@ -128,7 +128,7 @@ fn changes(words: &[String]) -> Option<Overrides> {
 
 fn sentence(found: &Answer, remedy: &Remedy) -> String {
     if let Happening::FollowerStairs { .. } = found.happening {
-        return format!("{}: {} (the slave by itself, on its recorded commands).", large(&remedy.text), remedy.outcome);
+        return format!("{}: {} (the slave alone, on its recorded commands).", large(&remedy.text), remedy.outcome);
     }
     let hands = match remedy.robust {
         true => "also with 0.7 to 1.5 times the grip, on walls of 0.5 to 2 times the stiffness, and with 25 % more gain",

@@ -66,8 +66,9 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
 fn of_cause(cause: &Cause) -> String {
     let place = if cause.place.is_empty() { String::new() } else { format!(" ({})", cause.place) };
     let confidence = share(cause.confidence);
-    let alone = cause.share.filter(|_| cause.seen).map_or_else(String::new, |share| {
-        format!(" ({} of the shaking goes when it alone is repaired)", percent(share))
-    });
+    let alone = cause
+        .share
+        .filter(|_| cause.seen)
+        .map_or_else(String::new, |share| format!(" ({} of the shaking goes when it alone is repaired)", percent(share)));
     format!("{}{place}, confidence {confidence}: {}; without it: {}{alone}", cause.kind.words(), cause.evidence, cause.without)
 }

@@ -146,7 +146,10 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         hear("the follower on its recorded commands");
         let was = as_recorded(graph, &answer.differences);
         (answer.causes, answer.remedies, answer.reproduced) = explained(graph, was, &answer.differences, recorded, &answer.happening);
-        answer.again = Some(if answer.reproduced { "the follower by itself goes in such stairs" } else { "the follower by itself goes smoothly" }.into());
+        answer.again = Some(
+            if answer.reproduced { "the follower, run alone, goes in such stairs" } else { "the follower, run alone, goes smoothly" }
+                .into(),
+        );
         of_events(&mut answer, recorded);
         return Ok(answer);
     }

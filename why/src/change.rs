@@ -90,7 +90,7 @@ pub enum Change {
         #[serde(skip)]
         files: Box<DeviceFiles>,
     },
-    /// Signals that are renewed too seldom are renewed so many times as often.
+    /// Signals that are renewed too seldom have a higher rate.
     Renewals {
         /// Factor.
         factor: f64,
@@ -299,7 +299,10 @@ impl std::fmt::Display for Change {
             }
             Change::HighPass { .. } => write!(f, "remove the high-pass from the canceller's estimate (high_pass_hz = 0)"),
             Change::WayRepaired { node, port } => {
-                write!(f, "repair the connection to {node}.{port}: no more delay, jitter, loss or filter than the graph states, and its full rate")
+                write!(
+                    f,
+                    "repair the connection to {node}.{port}: no more delay, jitter, loss or filter than the graph states, and its full rate"
+                )
             }
             Change::Delays { factor } if *factor == 0.0 => write!(f, "remove the delays, jitter and loss that the graph states"),
             Change::Delays { factor } => {
@@ -310,7 +313,11 @@ impl std::fmt::Display for Change {
             Change::DeviceRepaired { node, what, .. } => write!(f, "repair {node}: {what}"),
             Change::Servo { factor } => write!(f, "make the follower's servo {factor:.0} times as stiff"),
             Change::FeedForward { by, unit } => {
-                write!(f, "let the follower's command lead by {} on the side to which it moves: a feed-forward of its sliding friction", unit.text(*by))
+                write!(
+                    f,
+                    "let the follower's command lead by {} on the side to which it moves: a feed-forward of its sliding friction",
+                    unit.text(*by)
+                )
             }
             Change::Dither { by, hz, unit } => write!(f, "add a dither of {} at {hz:.0} Hz to the follower's command", unit.text(*by)),
             Change::FollowerWithoutFriction => write!(f, "remove the follower's dry friction"),
@@ -347,7 +354,9 @@ fn followers(graph: &mut Graph, change: impl Fn(&mut DeviceFiles)) {
 fn commanded(trial: &mut Trial, change: impl Fn(&mut Distortion)) {
     let slaves = trial.graph.nodes.iter().filter(|n| n.kind == NodeKind::Slave);
     let all: Vec<Distortion> = slaves
-        .flat_map(|node| (0..node.axes).map(|axis| Distortion { side: Side::Input(0), ..Distortion::none(&node.name, Quantity::Position, axis) }))
+        .flat_map(|node| {
+            (0..node.axes).map(|axis| Distortion { side: Side::Input(0), ..Distortion::none(&node.name, Quantity::Position, axis) })
+        })
         .map(|mut one| {
             change(&mut one);
             one

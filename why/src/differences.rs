@@ -76,7 +76,8 @@ pub fn differences(
         let Some(device) = of_device(&as_recorded(graph, &ways), index, &here, (recorded, look), hear, stop) else { continue };
         // What the device explains is one cause, in however many outputs it shows.
         let explains = device.files.is_some();
-        let kept = |d: &Difference| d.node != node.name || d.way.is_some() || (d.quantity, d.axis) == (first.quantity, first.axis) || !explains;
+        let kept =
+            |d: &Difference| d.node != node.name || d.way.is_some() || (d.quantity, d.axis) == (first.quantity, first.axis) || !explains;
         all.found.retain(kept);
         all.found.iter_mut().filter(|d| d.node == node.name && d.way.is_none()).for_each(|d| d.device = Some(device.clone()));
     }

@@ -100,7 +100,19 @@ struct Signal {
 impl Signal {
     fn new(how: &Distortion, period_s: f64, seed: u64) -> Signal {
         let filter = how.filter.map(|f| Butterworth::new(f.order, f.corner_hz, period_s));
-        Signal { how: how.clone(), period_s, raw: f64::NAN, side: 0.0, filter, held: f64::NAN, before: f64::NAN, renewed: 0, past: VecDeque::with_capacity(how.late + 1), last: f64::NAN, seed }
+        Signal {
+            how: how.clone(),
+            period_s,
+            raw: f64::NAN,
+            side: 0.0,
+            filter,
+            held: f64::NAN,
+            before: f64::NAN,
+            renewed: 0,
+            past: VecDeque::with_capacity(how.late + 1),
+            last: f64::NAN,
+            seed,
+        }
     }
 
     /// What becomes of a value at a step.

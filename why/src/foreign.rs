@@ -7,11 +7,11 @@ use crate::change::Change;
 use crate::happening::Happening;
 use crate::remedy::Remedy;
 use backdrive_stability::by_itself::compared::{AsIf, Sensor, compare};
+use backdrive_stability::coupling::Coupling;
 use backdrive_stability::frequency;
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::edge::Search;
 use backdrive_stability::session::{AxisSignals, Session};
-use backdrive_stability::coupling::Coupling;
 use backdrive_stability::verdict::{CoupledAxis, Question, Swapped, answer, is_coupled};
 use std::sync::atomic::AtomicBool;
 
@@ -157,7 +157,18 @@ fn measured(session: &Session, gain: Gain) -> (Measured, Vec<String>) {
 
 fn cause(kind: CauseKind, place: String, evidence: String, holds_without: bool) -> Cause {
     let without = "not re-simulated: no model of the loop is known".to_string();
-    Cause { kind, place, evidence, without, holds_without, edge_without: None, share: None, seen: true, confidence: 0.0, repairs: Vec::new() }
+    Cause {
+        kind,
+        place,
+        evidence,
+        without,
+        holds_without,
+        edge_without: None,
+        share: None,
+        seen: true,
+        confidence: 0.0,
+        repairs: Vec::new(),
+    }
 }
 
 /// What an axis' signals say of its two ways: from the master's position to the command, and from the contact force to the master.

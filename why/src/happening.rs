@@ -1,6 +1,6 @@
 //! What happens in a recording, before any question of why.
 
-use crate::follower::of_session;
+use crate::stairs::of_session;
 use backdrive_stability::judgement::frequency_hz;
 use backdrive_stability::oscillation::oscillation;
 use backdrive_stability::outcome::{Outcome, Trace, Unit};
@@ -99,7 +99,8 @@ impl Happening {
             trace.contact.truncate(rows);
         }
         // A follower that sticks and slips does so by itself, and needs no loop.
-        let calm = matches!(outcome, Outcome::Stable | Outcome::NotJudged { why: Unjudged::NoContact | Unjudged::NoFeedback | Unjudged::NoHold });
+        let calm =
+            matches!(outcome, Outcome::Stable | Outcome::NotJudged { why: Unjudged::NoContact | Unjudged::NoFeedback | Unjudged::NoHold });
         if (calm || session.is_one_way())
             && let Some((found, unit)) = of_session(session)
         {

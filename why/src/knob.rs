@@ -43,8 +43,17 @@ pub enum Knob {
 }
 
 /// Knobs of a master, the simplest explanation first.
-const OF_A_MASTER: [Knob; 9] =
-    [Knob::Grip, Knob::Motor, Knob::Masses, Knob::HeldMass, Knob::Sensor, Knob::MotorLag, Knob::MotorDelay, Knob::GripSprings, Knob::Forces];
+const OF_A_MASTER: [Knob; 9] = [
+    Knob::Grip,
+    Knob::Motor,
+    Knob::Masses,
+    Knob::HeldMass,
+    Knob::Sensor,
+    Knob::MotorLag,
+    Knob::MotorDelay,
+    Knob::GripSprings,
+    Knob::Forces,
+];
 
 /// Knobs of a slave that follows a command.
 const OF_A_SLAVE: [Knob; 5] = [Knob::Servo, Knob::Masses, Knob::Wall, Knob::Command, Knob::CommandLag];
@@ -80,7 +89,7 @@ impl Knob {
             // From one row to where a loop of a few hertz turns round.
             return [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0].iter().map(|ms| 1e-3 * ms).filter(|s| *s >= period_s).collect();
         }
-        let factors = [0.25, 0.4, 0.6, 0.8, 1.25, 1.6, 2.3, 3.5, 5.5];
+        let factors = [0.05, 0.12, 0.25, 0.4, 0.6, 0.8, 1.25, 1.6, 2.3, 3.5, 5.5, 9.0];
         let signed = matches!(self, Knob::Motor | Knob::Sensor | Knob::Command);
         signed.then_some(-1.0).into_iter().chain(factors).collect()
     }
@@ -210,13 +219,19 @@ impl Knob {
             Knob::Masses => format!("its masses are {value:.3} times those of its model"),
             Knob::HeldMass => format!("the mass at its handle or tip is {value:.3} times that of its model"),
             Knob::Motor if value < 0.0 => format!("its motor pushes {value:.3} times what is commanded: its sign is wrong"),
-            Knob::Motor => format!("its motor pushes {value:.3} times what is commanded: one factor on all its forces, a wrong torque constant"),
-            Knob::Forces => format!("all its own forces are {value:.3} times those of its model: a wrong torque constant when they were measured"),
+            Knob::Motor => {
+                format!("its motor pushes {value:.3} times what is commanded: one factor on all its forces, a wrong torque constant")
+            }
+            Knob::Forces => {
+                format!("all its own forces are {value:.3} times those of its model: a wrong torque constant when they were measured")
+            }
             Knob::MotorLag => format!("its motor lags its command by a low-pass of {:.1} Hz", 1.0 / (TAU * value.max(1e-9))),
             Knob::MotorDelay => format!("its motor acts {:.2} ms after its command", 1e3 * value),
             Knob::Sensor if value < 0.0 => format!("its measured position is {value:.3} times its motion: the sign of its sensor is wrong"),
             Knob::Sensor => format!("its measured position is {value:.3} times its motion"),
-            Knob::Servo => format!("its servo is {value:.3} times as strong as in its model: stiffness and damping together, as by a wrong torque constant"),
+            Knob::Servo => format!(
+                "its servo is {value:.3} times as strong as in its model: stiffness and damping together, as by a wrong torque constant"
+            ),
             Knob::Command if value < 0.0 => format!("it moves {value:.3} times its command: a sign is wrong"),
             Knob::Command => format!("it moves {value:.3} times its command"),
             Knob::CommandLag => format!("it follows its command behind a low-pass of {:.1} Hz", 1.0 / (TAU * value.max(1e-9))),

@@ -23,6 +23,7 @@ mod named;
 pub mod options;
 pub mod recording;
 pub mod remedy;
+mod stairs;
 mod stated;
 pub mod throw;
 pub mod trial;

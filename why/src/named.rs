@@ -38,7 +38,9 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
             AsIf::Filtered { order, corner_hz } => (
                 CauseKind::FilterLag,
                 place,
-                format!("the input {node}.{port} comes through a low-pass of {corner_hz:.1} Hz (order {order}) that the graph does not state"),
+                format!(
+                    "the input {node}.{port} comes through a low-pass of {corner_hz:.1} Hz (order {order}) that the graph does not state"
+                ),
             ),
             AsIf::Unsteady { late, .. } | AsIf::Changed { late, .. } => (
                 CauseKind::Delay,
@@ -148,10 +150,8 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
             } else {
                 CauseKind::OtherPhysics
             };
-            let text = format!(
-                "{node} differs by {share:.0} % from its model: {} is {:.4}, and {:.4} in the graph",
-                n.path, n.found, n.declared
-            );
+            let text =
+                format!("{node} differs by {share:.0} % from its model: {} is {:.4}, and {:.4} in the graph", n.path, n.found, n.declared);
             (kind, n.path.clone(), text)
         }
         None => {

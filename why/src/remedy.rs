@@ -2,8 +2,8 @@
 
 use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
-use crate::difference::Difference;
 use crate::change::{Change, is_friction_to_ground};
+use crate::difference::Difference;
 use crate::options::Word;
 use crate::throw::Throw;
 use crate::trial::{Hand, Trial};
@@ -134,7 +134,10 @@ pub fn remedies(
     all.retain(|r| {
         let kind = r.changes.first().map(std::mem::discriminant);
         let again = r.changes.len() == 1
-            && matches!(r.changes.first(), Some(Change::Damping { .. } | Change::Grip { .. } | Change::Gain { .. } | Change::Renewals { .. }))
+            && matches!(
+                r.changes.first(),
+                Some(Change::Damping { .. } | Change::Grip { .. } | Change::Gain { .. } | Change::Renewals { .. })
+            )
             && kinds.contains(&kind);
         kinds.push(kind);
         !again

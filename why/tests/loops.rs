@@ -31,6 +31,12 @@ fn said(lambda: f64, cancels: bool, more: Overrides, fault: impl Fn(&mut Trial))
     bag::asked(&file)
 }
 
+/// Something soft, at which the loop without a fault bears a gain of 20.
+fn soft() -> Overrides {
+    let environment = Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant/environments/soft-tissue.toml");
+    Overrides { environment: Some(environment), ..Overrides::default() }
+}
+
 fn first(answer: &Answer) -> (CauseKind, String) {
     let cause = answer.causes.first().unwrap_or_else(|| panic!("{:?} {:?}", answer.happening, answer.differs));
     (cause.kind, cause.evidence.clone())
@@ -55,7 +61,7 @@ fn a_sensor_of_the_wrong_sign_is_named_though_the_loop_never_touches_and_its_rep
 
 #[test]
 fn commands_that_are_held_have_their_rate_and_what_a_higher_one_gives() {
-    let answer = said(5.0, false, Overrides::default(), |t| {
+    let answer = said(6.0, false, soft(), |t| {
         let stage = NodeKind::Scaling.port("command", Direction::Output).unwrap().0;
         let hold = Some(Renewal { rows: 5000.0 / 30.0, phase: 0.0 });
         t.distortions.push(Distortion { stage, hold, ..Distortion::none("scaling", Quantity::Position, 0) });
@@ -94,7 +100,7 @@ fn a_firmer_grip_and_a_delay_are_both_named() {
 #[test]
 fn a_low_pass_in_the_force_path_is_no_late_sensor() {
     for order in [1, 2] {
-        let answer = said(2.0, false, Overrides::default(), |t| {
+        let answer = said(8.0, false, soft(), |t| {
             let filter = Some(Filter { order, corner_hz: 30.0 });
             let (stage, side) = (NodeKind::Master.port("force", Direction::Input).unwrap().0, Side::Input(1));
             t.distortions.push(Distortion { stage, side, filter, ..Distortion::none("master", Quantity::Effort, 0) });
@@ -121,7 +127,7 @@ fn a_stated_rate_that_is_too_low_is_the_rate_and_less_gain_is_a_remedy() {
 
 #[test]
 fn a_weak_servo_and_a_stiff_wall_are_the_slaves() {
-    let answer = said(5.0, false, Overrides::default(), |t| {
+    let answer = said(1.0, false, Overrides::default(), |t| {
         Knob::Servo.apply(t, "slave", 0.05);
         Knob::Wall.apply(t, "slave", 3.0);
     });

@@ -42,8 +42,7 @@ pub fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<
     let depth = between(1e-3, 3e-3);
     let rate = if has("low rate") { between(60.0, 300.0) } else { [5000.0, 2500.0, 1000.0, 5000.0][index as usize % 4] };
     let wall = if index % 4 == 3 { "plant/environments/soft-tissue.toml" } else { "plant/environments/stiff-wall.toml" };
-    let cancels =
-        ["grip", "inertia"].into_iter().any(has) || (index.is_multiple_of(2));
+    let cancels = ["grip", "inertia"].into_iter().any(has) || (index.is_multiple_of(2));
     let high_pass_hz = if has("grip") { 0.0 } else { 1.0 };
     let path = |p: &str| Some(std::env::current_dir().expect("a folder").join(p));
     let changes = Overrides {
@@ -90,133 +89,137 @@ pub fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<
     };
     let mut right: Vec<&'static [CauseKind]> = Vec::new();
     for part in parts.iter().copied().filter(|part| *part != "nothing") {
-    let causes: &'static [CauseKind] = match part {
-        "delay" | "jitter" | "loss" => {
-            let ways =
-                [(NodeKind::Slave, "command"), (NodeKind::Scaling, "contact"), (NodeKind::Master, "force"), (NodeKind::Scaling, "motion")];
-            // Of a slave that moves on by itself lost commands do not show one by one.
-            let (node, port) = ways[if part == "loss" { 1 + (index / 5) as usize % 3 } else { (index / 5) as usize % 4 }];
-            let way = end(&truth, node, port);
-            let (d, j, l) = match part {
-                "delay" => (between(1e-3, 40e-3), 0.0, 0.0),
-                "jitter" => (between(1e-3, 20e-3), between(2e-3, 30e-3), 0.0),
-                _ => (0.0, 0.0, between(0.9, 0.99)),
-            };
-            impair(&mut truth, way, d, j, l);
-            how += &format!("; to {port}: {:.1} ms, jitter {:.1} ms, loss {l:.2}", 1e3 * d, 1e3 * j);
-            &[CauseKind::Delay, CauseKind::Loss]
-        }
-        "grip" => {
-            let factor = between(1.15, 2.5);
-            firmer(&mut truth.graph, factor);
-            how += &format!("; grip {factor:.2} times as firm");
-            &[CauseKind::Grip, CauseKind::OverCancelling]
-        }
-        "inertia" => {
-            let factor = between(1.3, 4.0);
-            for node in truth.graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
-                if let backdrive_nodes::graph::Settings::Master(files) = &mut node.settings {
-                    for body in files.model.iter_mut().flat_map(|m| m.bodies.iter_mut()) {
-                        body.inertia *= factor;
+        let causes: &'static [CauseKind] = match part {
+            "delay" | "jitter" | "loss" => {
+                let ways = [
+                    (NodeKind::Slave, "command"),
+                    (NodeKind::Scaling, "contact"),
+                    (NodeKind::Master, "force"),
+                    (NodeKind::Scaling, "motion"),
+                ];
+                // Of a slave that moves on by itself lost commands do not show one by one.
+                let (node, port) = ways[if part == "loss" { 1 + (index / 5) as usize % 3 } else { (index / 5) as usize % 4 }];
+                let way = end(&truth, node, port);
+                let (d, j, l) = match part {
+                    "delay" => (between(1e-3, 40e-3), 0.0, 0.0),
+                    "jitter" => (between(1e-3, 20e-3), between(2e-3, 30e-3), 0.0),
+                    _ => (0.0, 0.0, between(0.9, 0.99)),
+                };
+                impair(&mut truth, way, d, j, l);
+                how += &format!("; to {port}: {:.1} ms, jitter {:.1} ms, loss {l:.2}", 1e3 * d, 1e3 * j);
+                &[CauseKind::Delay, CauseKind::Loss]
+            }
+            "grip" => {
+                let factor = between(1.15, 2.5);
+                firmer(&mut truth.graph, factor);
+                how += &format!("; grip {factor:.2} times as firm");
+                &[CauseKind::Grip, CauseKind::OverCancelling]
+            }
+            "inertia" => {
+                let factor = between(1.3, 4.0);
+                for node in truth.graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
+                    if let backdrive_nodes::graph::Settings::Master(files) = &mut node.settings {
+                        for body in files.model.iter_mut().flat_map(|m| m.bodies.iter_mut()) {
+                            body.inertia *= factor;
+                        }
                     }
                 }
+                how += &format!("; masses times {factor:.2}");
+                &[CauseKind::Inertia]
             }
-            how += &format!("; masses times {factor:.2}");
-            &[CauseKind::Inertia]
-        }
-        "scale" | "sign" | "late sensor" | "coarse" => {
-            let at_slave = index % 2 == 1 || part == "sign";
-            let (node, quantity) = if at_slave { ("slave", Quantity::Effort) } else { ("master", Quantity::Position) };
-            let mut wrong = Distortion::none(node, quantity, 0);
-            match part {
-                "scale" => wrong.gain = if at_slave { between(1.5, 8.0) } else { between(1.3, 3.0) },
-                "sign" => wrong.gain = -1.0,
-                "late sensor" => wrong.late = (between(1e-3, 40e-3) * rate) as usize,
-                _ => {
-                    wrong.node = "master".to_string();
-                    wrong.quantity = Quantity::Position;
-                    wrong.step = between(2e-5, 1e-3);
+            "scale" | "sign" | "late sensor" | "coarse" => {
+                let at_slave = index % 2 == 1 || part == "sign";
+                let (node, quantity) = if at_slave { ("slave", Quantity::Effort) } else { ("master", Quantity::Position) };
+                let mut wrong = Distortion::none(node, quantity, 0);
+                match part {
+                    "scale" => wrong.gain = if at_slave { between(1.5, 8.0) } else { between(1.3, 3.0) },
+                    "sign" => wrong.gain = -1.0,
+                    "late sensor" => wrong.late = (between(1e-3, 40e-3) * rate) as usize,
+                    _ => {
+                        wrong.node = "master".to_string();
+                        wrong.quantity = Quantity::Position;
+                        wrong.step = between(2e-5, 1e-3);
+                    }
+                }
+                how += &format!("; {}: gain {:.2}, late {}, step {:.1e}", wrong.node, wrong.gain, wrong.late, wrong.step);
+                truth.distortions.push(wrong);
+                match part {
+                    "scale" => &[CauseKind::ScaledSensor],
+                    "sign" => &[CauseKind::WrongSign],
+                    "late sensor" => &[CauseKind::LateSensor, CauseKind::Delay],
+                    _ => &[CauseKind::CoarseSensor],
                 }
             }
-            how += &format!("; {}: gain {:.2}, late {}, step {:.1e}", wrong.node, wrong.gain, wrong.late, wrong.step);
-            truth.distortions.push(wrong);
-            match part {
-                "scale" => &[CauseKind::ScaledSensor],
-                "sign" => &[CauseKind::WrongSign],
-                "late sensor" => &[CauseKind::LateSensor, CauseKind::Delay],
-                _ => &[CauseKind::CoarseSensor],
+            "held" => {
+                let hz = between(15.0, 60.0);
+                let mut held = Distortion::none("scaling", Quantity::Position, 0);
+                held.stage = NodeKind::Scaling.port("command", Direction::Output)?.0;
+                held.hold = Some(Renewal { rows: rate / hz, phase: 0.0 });
+                truth.distortions.push(held);
+                how += &format!("; commands held at {hz:.1} Hz");
+                &[CauseKind::Rate]
             }
-        }
-        "held" => {
-            let hz = between(15.0, 60.0);
-            let mut held = Distortion::none("scaling", Quantity::Position, 0);
-            held.stage = NodeKind::Scaling.port("command", Direction::Output)?.0;
-            held.hold = Some(Renewal { rows: rate / hz, phase: 0.0 });
-            truth.distortions.push(held);
-            how += &format!("; commands held at {hz:.1} Hz");
-            &[CauseKind::Rate]
-        }
-        "low-pass" => {
-            let (order, corner_hz) = (1 + index as usize % 2, between(8.0, 60.0));
-            let filter = Some(Filter { order, corner_hz });
-            if index % 4 < 2 {
-                truth.distortions.push(Distortion { filter, ..Distortion::none("slave", Quantity::Effort, 0) });
-            } else {
-                let stage = NodeKind::Master.port("force", Direction::Input)?.0;
-                let side = Side::Input(1);
-                truth.distortions.push(Distortion { stage, side, filter, ..Distortion::none("master", Quantity::Effort, 0) });
+            "low-pass" => {
+                let (order, corner_hz) = (1 + index as usize % 2, between(8.0, 60.0));
+                let filter = Some(Filter { order, corner_hz });
+                if index % 4 < 2 {
+                    truth.distortions.push(Distortion { filter, ..Distortion::none("slave", Quantity::Effort, 0) });
+                } else {
+                    let stage = NodeKind::Master.port("force", Direction::Input)?.0;
+                    let side = Side::Input(1);
+                    truth.distortions.push(Distortion { stage, side, filter, ..Distortion::none("master", Quantity::Effort, 0) });
+                }
+                how += &format!("; low-pass of order {order} at {corner_hz:.1} Hz");
+                &[CauseKind::FilterLag]
             }
-            how += &format!("; low-pass of order {order} at {corner_hz:.1} Hz");
-            &[CauseKind::FilterLag]
-        }
-        "torque" => {
-            let factor = between(1.3, 3.0);
-            Knob::Motor.apply(&mut truth, "master", factor);
-            how += &format!("; torque constant times {factor:.3}");
-            &[CauseKind::TorqueConstant]
-        }
-        "motor lag" => {
-            let corner_hz = between(8.0, 60.0);
-            Knob::MotorLag.apply(&mut truth, "master", 1.0 / (std::f64::consts::TAU * corner_hz));
-            how += &format!("; motor behind a low-pass of {corner_hz:.1} Hz");
-            &[CauseKind::FilterLag]
-        }
-        "servo" => {
-            let factor = between(0.02, 0.4);
-            Knob::Servo.apply(&mut truth, "slave", factor);
-            how += &format!("; servo times {factor:.3}");
-            &[CauseKind::Servo]
-        }
-        "wall" => {
-            let factor = between(1.5, 10.0);
-            Knob::Wall.apply(&mut truth, "slave", factor);
-            how += &format!("; wall times {factor:.3}");
-            &[CauseKind::Environment]
-        }
-        "slave play" => {
-            let gap = between(3e-4, 2e-3);
-            slave_of(&mut truth, |model| play(model, gap));
-            how += &format!("; {:.2} mm of play in the slave's drive", 1e3 * gap);
-            &[CauseKind::Backlash]
-        }
-        "slave friction" => {
-            let force = between(2.0, 20.0);
-            slave_of(&mut truth, |model| rub(model, force));
-            how += &format!("; {force:.1} N of dry friction at the slave's tip");
-            &[CauseKind::DryFriction]
-        }
-        "encoder sign" => {
-            truth.distortions.push(Distortion { gain: -1.0, ..Distortion::none("master", Quantity::Position, 0) });
-            how += "; the sign of the master's encoder";
-            &[CauseKind::WrongSign]
-        }
-        "low rate" => {
-            how += &format!("; {rate:.0} Hz");
-            &[CauseKind::Rate]
-        }
-        _ => &[],
-    };
-    right.push(causes);
+            "torque" => {
+                let factor = between(1.3, 3.0);
+                Knob::Motor.apply(&mut truth, "master", factor);
+                how += &format!("; torque constant times {factor:.3}");
+                &[CauseKind::TorqueConstant]
+            }
+            "motor lag" => {
+                let corner_hz = between(8.0, 60.0);
+                Knob::MotorLag.apply(&mut truth, "master", 1.0 / (std::f64::consts::TAU * corner_hz));
+                how += &format!("; motor behind a low-pass of {corner_hz:.1} Hz");
+                &[CauseKind::FilterLag]
+            }
+            "servo" => {
+                let factor = between(0.02, 0.4);
+                Knob::Servo.apply(&mut truth, "slave", factor);
+                how += &format!("; servo times {factor:.3}");
+                &[CauseKind::Servo]
+            }
+            "wall" => {
+                let factor = between(1.5, 10.0);
+                Knob::Wall.apply(&mut truth, "slave", factor);
+                how += &format!("; wall times {factor:.3}");
+                &[CauseKind::Environment]
+            }
+            "slave play" => {
+                let gap = between(3e-4, 2e-3);
+                slave_of(&mut truth, |model| play(model, gap));
+                how += &format!("; {:.2} mm of play in the slave's drive", 1e3 * gap);
+                &[CauseKind::Backlash]
+            }
+            "slave friction" => {
+                let force = between(2.0, 20.0);
+                slave_of(&mut truth, |model| rub(model, force));
+                how += &format!("; {force:.1} N of dry friction at the slave's tip");
+                &[CauseKind::DryFriction]
+            }
+            "encoder sign" => {
+                truth.distortions.push(Distortion { gain: -1.0, ..Distortion::none("master", Quantity::Position, 0) });
+                how += "; the sign of the master's encoder";
+                &[CauseKind::WrongSign]
+            }
+            "low rate" => {
+                how += &format!("; {rate:.0} Hz");
+                &[CauseKind::Rate]
+            }
+            _ => &[],
+        };
+        right.push(causes);
     }
     let own = Gain { mu: declared.gains.mu, lambda: declared.gains.lambda };
     let run = truth.run(&hand, own, &RunOptions { keep_signals: true, ..RunOptions::default() }, &NEVER).ok()?;

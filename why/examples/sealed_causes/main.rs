@@ -9,8 +9,8 @@ mod bag;
 mod draw;
 mod score;
 
-use bag::{asked, record};
 use backdrive_why::answer::Answer;
+use bag::{asked, record};
 use draw::{Case, drawn};
 use score::Scores;
 use std::sync::atomic::AtomicBool;
