@@ -8,6 +8,7 @@ use crate::as_recorded::{as_recorded, is_modelled};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::difference::Difference;
+use crate::fine::is_fine;
 use crate::happening::Happening;
 use crate::named::{named, of_number};
 use crate::stated::{Suspect, of_the_graph};
@@ -99,7 +100,8 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
     let holds_without_all = seen > 1 && {
         let mut none = Trial::of(asked.graph.clone());
         asked.always.iter().for_each(|c| c.apply(&mut none));
-        none.run(asked.hand, asked.gain, &RunOptions::default(), cancel)?.outcome.is_stable()
+        let run = none.run(asked.hand, asked.gain, &RunOptions::default(), cancel)?;
+        is_fine(&none, asked.hand, asked.gain, &run, cancel)?
     };
     let judged: Vec<(Cause, f64)> = suspects
         .into_par_iter()

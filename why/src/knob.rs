@@ -38,6 +38,8 @@ pub enum Knob {
     Command,
     /// Time constant of a lag before a slave's servo, s.
     CommandLag,
+    /// Delay before a slave's servo, s.
+    CommandDelay,
     /// Every force of what the slave touches.
     Wall,
 }
@@ -56,7 +58,7 @@ const OF_A_MASTER: [Knob; 9] = [
 ];
 
 /// Knobs of a slave that follows a command.
-const OF_A_SLAVE: [Knob; 5] = [Knob::Servo, Knob::Masses, Knob::Wall, Knob::Command, Knob::CommandLag];
+const OF_A_SLAVE: [Knob; 6] = [Knob::Servo, Knob::Masses, Knob::Wall, Knob::Command, Knob::CommandLag, Knob::CommandDelay];
 
 impl Knob {
     /// Those that a device has.
@@ -80,7 +82,7 @@ impl Knob {
 
     /// Whether its value is a time, s.
     pub fn is_time(self) -> bool {
-        matches!(self, Knob::MotorLag | Knob::MotorDelay | Knob::CommandLag)
+        matches!(self, Knob::MotorLag | Knob::MotorDelay | Knob::CommandLag | Knob::CommandDelay)
     }
 
     /// Values from which a search starts, beside the neutral one.
@@ -136,7 +138,7 @@ impl Knob {
                     }
                 }
             }
-            Knob::MotorDelay => self.put(files, -value),
+            Knob::MotorDelay | Knob::CommandDelay => self.put(files, -value),
             _ if value != 0.0 => self.put(files, 1.0 / value),
             _ => {}
         }
@@ -176,7 +178,7 @@ impl Knob {
                     }
                 }
             }
-            Knob::MotorDelay => {
+            Knob::MotorDelay | Knob::CommandDelay => {
                 for input in feedbacks {
                     if let Some(input) = model.inputs.get_mut(input) {
                         input.delay += value;
@@ -203,7 +205,7 @@ impl Knob {
             Knob::Motor | Knob::Sensor | Knob::Command if value < 0.0 => CauseKind::WrongSign,
             Knob::Motor | Knob::Forces => CauseKind::TorqueConstant,
             Knob::MotorLag | Knob::CommandLag => CauseKind::FilterLag,
-            Knob::MotorDelay => CauseKind::Delay,
+            Knob::MotorDelay | Knob::CommandDelay => CauseKind::Delay,
             Knob::Sensor | Knob::Command => CauseKind::ScaledSensor,
             Knob::Servo => CauseKind::Servo,
             Knob::Wall => CauseKind::Environment,
@@ -235,6 +237,7 @@ impl Knob {
             Knob::Command if value < 0.0 => format!("it moves {value:.3} times its command: a sign is wrong"),
             Knob::Command => format!("it moves {value:.3} times its command"),
             Knob::CommandLag => format!("it follows its command behind a low-pass of {:.1} Hz", 1.0 / (TAU * value.max(1e-9))),
+            Knob::CommandDelay => format!("it follows its command {:.2} ms later than its model", 1e3 * value),
             Knob::Wall => format!("what it touches is {value:.3} times as stiff as in the graph"),
         }
     }
@@ -251,6 +254,7 @@ impl Knob {
             Knob::Servo => format!("set {node}'s servo as its model states"),
             Knob::Command => format!("correct the scale and the sign of {node}'s command"),
             Knob::CommandLag => format!("remove the low-pass before {node}'s servo"),
+            Knob::CommandDelay => format!("remove the delay before {node}'s servo"),
             Knob::Wall => "touch what the graph states".to_string(),
         }
     }

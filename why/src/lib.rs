@@ -13,6 +13,7 @@ pub mod device;
 pub mod difference;
 pub mod differences;
 pub mod faulty;
+mod fine;
 #[cfg(test)]
 mod fixtures;
 mod follower;

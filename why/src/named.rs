@@ -51,7 +51,7 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
         };
     }
     if let Some(device) = &difference.device {
-        return of_device(device, node, share);
+        return of_device(device, (node, difference.kind == NodeKind::Master), share);
     }
     let place = node.clone();
     match difference.compared.as_if {
@@ -111,7 +111,7 @@ pub fn of_number(number: &Tuned, node: &str) -> (CauseKind, String, String) {
 }
 
 /// The diagnosis of a device, as a cause.
-fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String, String) {
+fn of_device(device: &DeviceFound, (node, is_master): (&str, bool), share: f64) -> (CauseKind, String, String) {
     let kind_of = |f: &PhysicsFound| match (f.family, f.of_signal) {
         (Some(Family::Friction), _) => CauseKind::DryFriction,
         (Some(Family::Hysteresis), _) => CauseKind::Hysteresis,
@@ -119,6 +119,7 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
         (Some(Family::Inertia), _) => CauseKind::Inertia,
         (Some(Family::Compliance), _) => CauseKind::Compliance,
         (Some(Family::Scale), _) => CauseKind::ScaledSensor,
+        (Some(Family::Lag), true) if !is_master => CauseKind::Delay,
         (Some(Family::Lag), true) => CauseKind::LateSensor,
         (Some(Family::Limit), true) => CauseKind::Saturation,
         _ => CauseKind::OtherPhysics,
@@ -137,7 +138,7 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
             size(first),
             backdrive_diagnosis::verdict::words::share(first.confidence)
         );
-        return (kind_of(first), if node == "master" { first.place.clone() } else { format!("{node}, {}", first.place) }, text);
+        return (kind_of(first), if is_master { first.place.clone() } else { format!("{node}, {}", first.place) }, text);
     }
     let moved = |n: &NumberFound| (n.found / n.declared).abs().ln().abs();
     let most = device.numbers.iter().filter(|n| n.declared != 0.0 && n.found != 0.0).max_by(|a, b| moved(a).total_cmp(&moved(b)));

@@ -4,13 +4,13 @@ use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
 use crate::change::{Change, is_friction_to_ground};
 use crate::difference::Difference;
+pub use crate::fine::is_fine;
 use crate::options::Word;
 use crate::throw::Throw;
 use crate::trial::{Hand, Trial};
 use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
-use backdrive_stability::outcome::Outcome;
-use backdrive_stability::resimulate::{Gain, ResimulateError, Run, RunOptions};
+use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -335,19 +335,6 @@ fn motion_kept(session: &Session, free: &Option<Session>, mu: f64) -> f64 {
 
 fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
     is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
-}
-
-/// Whether nothing oscillates: a limit may act, where nothing would happen without it.
-///
-/// # Errors
-/// As a run.
-pub fn is_fine(trial: &Trial, hand: &Hand, gain: Gain, run: &Run, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
-    if !matches!(run.outcome, Outcome::Limited { beyond_travel: false, .. }) {
-        return Ok(run.outcome.is_stable());
-    }
-    let mut unlimited = trial.clone();
-    Change::NoLimits.apply(&mut unlimited);
-    Ok(unlimited.run(hand, gain, &RunOptions::default(), cancel)?.outcome.is_stable())
 }
 
 #[cfg(test)]

@@ -13,6 +13,9 @@ use serde::Serialize;
 /// Numbers explain a difference where they leave no more of it than this.
 const EXPLAINS: f64 = 0.1;
 
+/// A difference as large as this is all of a signal: what is larger is not explained by leaving more.
+const ALL: f64 = 0.5;
+
 /// Another number has to leave less than this share of what was left before it.
 const WORTH: f64 = 0.4;
 
@@ -56,7 +59,7 @@ pub struct Explained {
 impl Explained {
     /// Whether little enough is left.
     pub fn is_enough(&self) -> bool {
-        self.left <= (EXPLAINS * self.before).max(0.5 * SMALL).min(0.5 * self.before)
+        self.left <= (EXPLAINS * self.before.min(ALL)).max(0.5 * SMALL).min(0.5 * self.before)
     }
 }
 
