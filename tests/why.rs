@@ -130,64 +130,6 @@ fn play_in_the_slave_is_found_there_with_its_size_and_the_loop_with_it_does_what
     assert_eq!(asked(&live, &[]).0["happening"]["happens"], "nothing", "lambda {lambda}");
 }
 
-/// A leader and a follower whose gear breaks away at 2.8 N m and slides at 0.7 N m on a servo of 60 N m/rad: steps of up to 2 (2.8 - 0.7)/60 = 70 mrad.
-const STAIRS: [(&str, &str); 4] = [
-    (
-        "leader.toml",
-        "name = 'leader'\nmotion = 'rotation'\nbodies = { handle = 0.02 }\n\
-         elements = [{ name = 'damping', kind = 'damper', between = ['handle', 'ground'], damping = 0.1 }]\n\
-         inputs = [{ name = 'feedback', kind = 'force', on = 'handle', hold = 'zero' }]\n\
-         outputs = [{ name = 'angle', kind = 'position', of = 'handle' }]\n\
-         axes = [{ name = 'rot', user = 'handle', feedback = 'feedback', measured = 'angle', travel = [-3.0, 3.0] }]\n",
-    ),
-    (
-        "follower.toml",
-        "name = 'follower'\nmotion = 'rotation'\nbodies = { command = 0.0, joint = 0.35 }\n\
-         elements = [{ name = 'servo', kind = 'spring', between = ['command', 'joint'], stiffness = 60.0 },\n\
-         { name = 'servo_damping', kind = 'damper', between = ['joint', 'ground'], damping = 3.0 },\n\
-         { name = 'gear', kind = 'stribeck', between = ['joint', 'ground'], coulomb = 0.7, static = 2.8, velocity = 0.1 }]\n\
-         inputs = [{ name = 'command', kind = 'motion', on = 'command', hold = 'linear' }]\n\
-         outputs = [{ name = 'angle', kind = 'position', of = 'joint' }]\n\
-         axes = [{ name = 'rot', user = 'joint', feedback = 'command', measured = 'angle', travel = [-3.0, 3.0] }]\n",
-    ),
-    (
-        "knob.toml",
-        "name = 'knob'\nkind = 'fragment'\nmotion = 'rotation'\n\
-         elements = [{ name = 'wrist', kind = 'spring', between = ['port', 'hand'], stiffness = 8.0 },\n\
-         { name = 'wrist_damping', kind = 'damper', between = ['port', 'hand'], damping = 0.15 }]\n",
-    ),
-    (
-        "stairs.toml",
-        "title = 'stairs'\nrate_hz = 500\nduration_s = 8.0\nclock = 'lockstep'\nseed = 1\ngains = { mu = 1.0, lambda = 0.0 }\n\
-         nodes = [{ name = 'operator', kind = 'operator', waypoints = [{ t = 0.5, x = 0.0 }, { t = 7.5, x = 0.35 }] },\n\
-         { name = 'master', kind = 'master', model = 'leader.toml', grip = 'knob.toml' },\n{ name = 'scaling', kind = 'scaling' },\n\
-         { name = 'slave', kind = 'slave', model = 'follower.toml' }, { name = 'recorder', kind = 'recorder', bag = 'stairs.mcap' }]\n\
-         connections = [{ from = 'operator.intent', to = 'master.intent' }, { from = 'master.measured', to = 'scaling.motion' },\n\
-         { from = 'scaling.command', to = 'slave.command' }, { from = 'slave.measured', to = 'scaling.contact', delay = 1 },\n\
-         { from = 'master.measured', to = 'scaling.measured', delay = 1 }, { from = 'scaling.force', to = 'master.force' }]\n",
-    ),
-];
-
-#[test]
-fn a_follower_that_goes_in_stairs_is_told_without_a_loop_and_each_remedy_is_tried() {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in STAIRS {
-        std::fs::write(folder.path().join(name), text).unwrap();
-    }
-    let bag = folder.path().join("stairs.mcap");
-    let (graph, out) = (folder.path().join("stairs.toml").display().to_string(), bag.display().to_string());
-    let ran = backdrive(&["run", &graph, "--transport", "inproc", "--bag", &out]);
-    assert!(bag.exists(), "{}", String::from_utf8_lossy(&ran.stderr));
-    let (said, code) = asked(&bag, &[]);
-    assert_eq!((code, &said["happening"]["happens"], &said["reproduced"]), (Some(1), &"follower_stairs".into(), &true.into()), "{said}");
-    let step = said["happening"]["step"].as_f64().unwrap();
-    assert!((0.05..0.09).contains(&step), "{step}");
-    assert_eq!(said["causes"][0]["kind"], "stiction", "{said}");
-    let tried: Vec<&str> = said["remedies"].as_array().unwrap().iter().filter_map(|r| r["changes"][0]["change"].as_str()).collect();
-    assert!(["servo", "feed_forward", "dither"].iter().all(|kind| tried.contains(kind)), "{tried:?}");
-    assert_eq!(said["remedies"][0]["stops"], true, "{said}");
-}
-
 /// Loops with something hidden, by the example that draws them. Of one round of kinds all but a few are named; the whole set is in docs/figures.md.
 #[test]
 fn hidden_faults_are_found_from_the_bag_alone() {

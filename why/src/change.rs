@@ -197,6 +197,7 @@ impl Change {
                 }
             }
             Change::SensorRepaired { node } => trial.distortions.retain(|d| d.node != *node),
+            Change::NumberRepaired { node, knob: Knob::CommandDelay, value } => undelayed(&mut trial.graph, node, *value),
             Change::NumberRepaired { node, knob, value } => device(&mut trial.graph, node, |files| knob.undo(files, *value)),
             Change::DeviceRepaired { node, files: stated, .. } => device(&mut trial.graph, node, |files| *files = (**stated).clone()),
             Change::Servo { factor } => followers(&mut trial.graph, |files| Knob::Servo.put(files, *factor)),
@@ -363,6 +364,28 @@ fn commanded(trial: &mut Trial, change: impl Fn(&mut Distortion)) {
         })
         .collect();
     trial.distortions.extend(all);
+}
+
+/// Takes a delay off a slave's command: in front of its servo, and what is more than the delay there off the connection.
+fn undelayed(graph: &mut Graph, node: &str, delay_s: f64) {
+    let mut rest = 0.0;
+    for node in graph.nodes.iter_mut().filter(|n| n.name == node) {
+        let Settings::Slave(DeviceFiles { model: Some(model), .. }) = &mut node.settings else { continue };
+        let feedbacks: Vec<usize> = model.axes.iter().map(|a| a.feedback).collect();
+        for input in feedbacks {
+            if let Some(input) = model.inputs.get_mut(input) {
+                let taken = delay_s.min(input.delay.max(0.0));
+                input.delay -= taken;
+                rest = delay_s - taken;
+            }
+        }
+    }
+    let Some(index) = graph.nodes.iter().position(|n| n.name == node) else { return };
+    for way in graph.connections.iter_mut().filter(|c| c.to.0 == index && c.to.1 == "command") {
+        if let Some(impairment) = &mut way.impairment {
+            impairment.delay_s = (impairment.delay_s - rest).max(0.0);
+        }
+    }
 }
 
 /// Changes the files of a master or a slave.

@@ -99,20 +99,21 @@ fn a_firmer_grip_and_a_delay_are_both_named() {
 
 #[test]
 fn a_low_pass_in_the_force_path_is_no_late_sensor() {
-    for order in [1, 2] {
+    // The slower one is only a difference, because the loop holds with it.
+    for (order, corner_hz, shakes) in [(1, 30.0, false), (2, 55.0, true)] {
         let answer = said(8.0, false, soft(), |t| {
-            let filter = Some(Filter { order, corner_hz: 30.0 });
+            let filter = Some(Filter { order, corner_hz });
             let (stage, side) = (NodeKind::Master.port("force", Direction::Input).unwrap().0, Side::Input(1));
             t.distortions.push(Distortion { stage, side, filter, ..Distortion::none("master", Quantity::Effort, 0) });
         });
-        assert!(answer.happening.is_trouble(), "{}", answer.happens);
-        let (kind, evidence) = first(&answer);
-        assert!(kind == CauseKind::FilterLag && evidence.contains(&format!("order {order}")), "{kind:?} {evidence}");
+        assert_eq!(answer.happening.is_trouble(), shakes, "{}", answer.happens);
+        assert!(answer.differs.iter().any(|d| d.contains(&format!("order {order}"))), "{:?}", answer.differs);
         let corner = answer.differences.iter().find_map(|d| match d.compared.as_if {
             AsIf::Filtered { corner_hz, .. } => Some(corner_hz),
             _ => None,
         });
-        assert!(corner.is_some_and(|hz| (hz / 30.0 - 1.0).abs() < 0.03), "{corner:?}");
+        assert!(corner.is_some_and(|hz| (hz / corner_hz - 1.0).abs() < 0.03), "{corner:?}");
+        assert!(!shakes || first(&answer).0 == CauseKind::FilterLag, "{:?}", answer.causes);
     }
 }
 
@@ -133,4 +134,61 @@ fn a_weak_servo_and_a_stiff_wall_are_the_slaves() {
     });
     assert!((number(&answer, Knob::Servo) / 0.05 - 1.0).abs() < 0.05, "{:?}", answer.differs);
     assert!((number(&answer, Knob::Wall) / 3.0 - 1.0).abs() < 0.05, "{:?}", answer.differs);
+}
+
+/// A leader and a follower whose gear breaks away at 2.8 N m and slides at 0.7 N m on a servo of 60 N m/rad: steps of up to 2 (2.8 - 0.7)/60 = 70 mrad.
+const STAIRS: [(&str, &str); 4] = [
+    (
+        "leader.toml",
+        "name = 'leader'\nmotion = 'rotation'\nbodies = { handle = 0.02 }\n\
+         elements = [{ name = 'damping', kind = 'damper', between = ['handle', 'ground'], damping = 0.1 }]\n\
+         inputs = [{ name = 'feedback', kind = 'force', on = 'handle', hold = 'zero' }]\n\
+         outputs = [{ name = 'angle', kind = 'position', of = 'handle' }]\n\
+         axes = [{ name = 'rot', user = 'handle', feedback = 'feedback', measured = 'angle', travel = [-3.0, 3.0] }]\n",
+    ),
+    (
+        "follower.toml",
+        "name = 'follower'\nmotion = 'rotation'\nbodies = { command = 0.0, joint = 0.35 }\n\
+         elements = [{ name = 'servo', kind = 'spring', between = ['command', 'joint'], stiffness = 60.0 },\n\
+         { name = 'servo_damping', kind = 'damper', between = ['joint', 'ground'], damping = 3.0 },\n\
+         { name = 'gear', kind = 'stribeck', between = ['joint', 'ground'], coulomb = 0.7, static = 2.8, velocity = 0.1 }]\n\
+         inputs = [{ name = 'command', kind = 'motion', on = 'command', hold = 'linear' }]\n\
+         outputs = [{ name = 'angle', kind = 'position', of = 'joint' }]\n\
+         axes = [{ name = 'rot', user = 'joint', feedback = 'command', measured = 'angle', travel = [-3.0, 3.0] }]\n",
+    ),
+    (
+        "knob.toml",
+        "name = 'knob'\nkind = 'fragment'\nmotion = 'rotation'\n\
+         elements = [{ name = 'wrist', kind = 'spring', between = ['port', 'hand'], stiffness = 8.0 },\n\
+         { name = 'wrist_damping', kind = 'damper', between = ['port', 'hand'], damping = 0.15 }]\n",
+    ),
+    (
+        "stairs.toml",
+        "title = 'stairs'\nrate_hz = 500\nduration_s = 8.0\nclock = 'lockstep'\nseed = 1\ngains = { mu = 1.0, lambda = 0.0 }\n\
+         nodes = [{ name = 'operator', kind = 'operator', waypoints = [{ t = 0.5, x = 0.0 }, { t = 7.5, x = 0.35 }] },\n\
+         { name = 'master', kind = 'master', model = 'leader.toml', grip = 'knob.toml' },\n{ name = 'scaling', kind = 'scaling' },\n\
+         { name = 'slave', kind = 'slave', model = 'follower.toml' }, { name = 'recorder', kind = 'recorder', bag = 'stairs.mcap' }]\n\
+         connections = [{ from = 'operator.intent', to = 'master.intent' }, { from = 'master.measured', to = 'scaling.motion' },\n\
+         { from = 'scaling.command', to = 'slave.command' }, { from = 'slave.measured', to = 'scaling.contact', delay = 1 },\n\
+         { from = 'master.measured', to = 'scaling.measured', delay = 1 }, { from = 'scaling.force', to = 'master.force' }]\n",
+    ),
+];
+
+#[test]
+fn a_follower_that_goes_in_stairs_is_named_without_a_loop_and_each_remedy_is_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in STAIRS {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let graph = Graph::load(&folder.path().join("stairs.toml"), &Overrides::default()).unwrap();
+    let file = folder.path().join("stairs.mcap");
+    bag::record(&graph, &Trial::of(graph.clone()), &file);
+    let answer = bag::asked(&file);
+    let Happening::FollowerStairs { step, stands, .. } = answer.happening else { panic!("{}", answer.happens) };
+    assert!((0.05..0.09).contains(&step) && stands > 0.5 && answer.reproduced, "{}", answer.happens);
+    assert_eq!(first(&answer).0, CauseKind::Stiction, "{:?}", answer.causes);
+    let tried = |of: fn(&Change) -> bool| answer.remedies.iter().any(|r| of(&r.changes[0]));
+    assert!(tried(|c| matches!(c, Change::Servo { .. })) && tried(|c| matches!(c, Change::FeedForward { .. })));
+    assert!(tried(|c| matches!(c, Change::Dither { .. })));
+    assert!(answer.remedies[0].stops, "{:?}", answer.remedies.iter().map(|r| (&r.text, &r.outcome)).collect::<Vec<_>>());
 }
