@@ -44,8 +44,8 @@ impl Scores {
         let named = first.is_some_and(|c| case.right.iter().any(|right| right.contains(&c.kind)));
         if case.right.len() > 1 {
             // Both have to be among the first three, by what they are.
-            let has = |right: &&[CauseKind]| answer.causes.iter().take(3).any(|c| right.contains(&c.kind));
-            let both = case.right.iter().all(|right| has(right));
+            let has = |right: &&'static [CauseKind]| answer.causes.iter().take(3).any(|c| right.contains(&c.kind));
+            let both = case.right.iter().all(has);
             self.pairs += 1;
             self.both += usize::from(both);
         }
