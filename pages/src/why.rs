@@ -120,17 +120,22 @@ fn causes(page: &mut Page, found: &Answer) {
         page.text(&if trouble { format!("The cause {}.", NO_CAUSE) } else { "There is no oscillation, so there is no cause.".to_string() });
         return;
     }
-    page.text(
+    let alone = matches!(found.happening, Happening::FollowerStairs { .. });
+    page.text(if alone {
+        "The slave was run alone on its recorded commands, as recorded and without its dry friction."
+    } else {
         "The loop was re-simulated as recorded, and once without each suspect. A suspect seen in the recording has more weight than one \
-         stated by the graph. A suspect without which the loop still oscillates has little weight.",
-    );
-    let mut table = Table::new(["cause", "where", "confidence", "seen", "without it", "stable up to μλ, without it"]);
+         stated by the graph. A suspect without which the loop still oscillates has little weight."
+    });
+    let mut table =
+        Table::new(["cause", "where", "confidence", "seen", "goes when it alone is repaired", "without it", "stable up to μλ, without it"]);
     for cause in found.causes.iter().filter(|c| c.confidence >= UNLIKELY) {
         table.push([
             large(cause.kind.words()),
             cause.place.clone(),
             share(cause.confidence),
             if cause.seen { "yes" } else { "no" }.to_string(),
+            cause.share.map_or_else(String::new, percent),
             cause.without.clone(),
             cause.edge_without.map_or_else(|| if cause.holds_without { "everything tried".to_string() } else { String::new() }, number),
         ]);
@@ -150,7 +155,7 @@ fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
         "remedy",
         "result",
         "stops it",
-        "other grips, higher gain",
+        "other grips, walls and gain",
         "force left",
         "motion left",
         "beyond the recording",

@@ -24,7 +24,7 @@ pub struct Why {
     /// Write the answer as one HTML file that opens offline.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// If the master differs from the graph: write the identified master with its grip as a model file for a canceller.
+    /// If the master differs from the graph: write it as found, with its grip, as a model file for a canceller. If only the slave differs: write that.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Print the answer as JSON.

@@ -63,14 +63,14 @@ impl Explained {
                 other => Failure::input(format!("{}: {other}", path.display())),
             })
         })?;
-        let master = match (out, &answer.master) {
+        let master = match (out, answer.master.as_ref().or(answer.slave.as_ref())) {
             (Some(out), Some(model)) => {
                 output::file(out, model)?;
                 output::note(format_args!("wrote {}", out.display()));
                 Some(out)
             }
             (Some(out), None) => {
-                output::note(format_args!("{}: not written, because the master behaves as the graph states", out.display()));
+                output::note(format_args!("{}: not written, because no device differs from its model in the graph", out.display()));
                 None
             }
             (None, _) => None,

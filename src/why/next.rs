@@ -33,7 +33,7 @@ pub struct Asked<'a> {
 /// What to do, the best first.
 pub fn next(found: &Answer, asked: &Asked) -> Vec<Step> {
     let stop: Vec<&Remedy> = found.remedies.iter().filter(|r| r.stops).take(PROPOSED).collect();
-    let mut steps: Vec<Step> = stop.iter().map(|remedy| Step::new(sentence(remedy), commands(found, asked, remedy))).collect();
+    let mut steps: Vec<Step> = stop.iter().map(|remedy| Step::new(sentence(found, remedy), commands(found, asked, remedy))).collect();
     if let Some(run) = stop.iter().find_map(|remedy| run(found, asked, remedy)) {
         let text = "When the replay does what you want, run the bag's graph with it: every option of the recorded run stays as recorded.";
         steps.push(Step::new(text, [Some(run)]));
@@ -68,20 +68,26 @@ pub fn commands(found: &Answer, asked: &Asked, remedy: &Remedy) -> Vec<Option<Of
     if found.differences.is_empty() {
         return vec![with(Builder::verb("replay").reads(asked.recording), asked, remedy, None)];
     }
-    // Of what is not as the graph states, only another master can be put into a replay.
-    let of_master = |d: &backdrive_why::difference::Difference| d.device.as_ref().is_some_and(|device| device.files.is_some());
-    if !found.differences.iter().all(of_master) || found.master.is_none() {
+    // Of what is not as the graph states, only another master or another slave can be put into a replay.
+    let of_device = |d: &backdrive_why::difference::Difference| d.device.as_ref().is_some_and(|device| device.files.is_some());
+    let other = match (&found.master, &found.slave) {
+        (Some(_), None) => "master",
+        (None, Some(_)) => "slave",
+        _ => return Vec::new(),
+    };
+    if !found.differences.iter().all(|d| of_device(d) && d.kind.name() == other) {
         return Vec::new();
     }
     let (file, write) = match asked.master {
         Some(file) => (file.to_path_buf(), None),
         None => {
             let stem = asked.recording.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-            let file: PathBuf = free(&PathBuf::from(format!("{stem}-master.toml")));
+            let file: PathBuf = free(&PathBuf::from(format!("{stem}-{other}.toml")));
             (file.clone(), Some(Builder::verb("why").reads(asked.recording).option_writes("--out", &file).build()))
         }
     };
-    let replay = Builder::verb("replay").reads(asked.recording).word("--master").reads_later(&file).option("--grip", "none");
+    let replay = Builder::verb("replay").reads(asked.recording).word(&format!("--{other}")).reads_later(&file);
+    let replay = if other == "master" { replay.option("--grip", "none") } else { replay };
     write.into_iter().chain([with(replay, asked, remedy, Some(&file))]).collect()
 }
 
@@ -120,9 +126,12 @@ fn changes(words: &[String]) -> Option<Overrides> {
     }
 }
 
-fn sentence(remedy: &Remedy) -> String {
+fn sentence(found: &Answer, remedy: &Remedy) -> String {
+    if let Happening::FollowerStairs { .. } = found.happening {
+        return format!("{}: {} (the slave alone, on its recorded commands).", large(&remedy.text), remedy.outcome);
+    }
     let hands = match remedy.robust {
-        true => "also with a grip 15 % softer or stiffer and with 25 % more gain",
+        true => "also with 0.7 to 1.5 times the grip, on walls of 0.5 to 2 times the stiffness, and with 25 % more gain",
         false => "with this grip and this gain only",
     };
     let throws = remedy.throws.as_ref().map_or_else(String::new, |throw| format!("; {throw}"));

@@ -3,6 +3,7 @@
 use crate::offered::{Step, lines};
 use backdrive_diagnosis::verdict::words::share;
 use backdrive_pages::why::NO_CAUSE;
+use backdrive_report::percent;
 use backdrive_why::answer::Answer;
 use backdrive_why::cause::Cause;
 use backdrive_why::happening::Happening;
@@ -65,5 +66,9 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
 fn of_cause(cause: &Cause) -> String {
     let place = if cause.place.is_empty() { String::new() } else { format!(" ({})", cause.place) };
     let confidence = share(cause.confidence);
-    format!("{}{place}, confidence {confidence}: {}; without it: {}", cause.kind.words(), cause.evidence, cause.without)
+    let alone = cause
+        .share
+        .filter(|_| cause.seen)
+        .map_or_else(String::new, |share| format!(" ({} of the shaking goes when it alone is repaired)", percent(share)));
+    format!("{}{place}, confidence {confidence}: {}; without it: {}{alone}", cause.kind.words(), cause.evidence, cause.without)
 }

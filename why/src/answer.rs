@@ -6,13 +6,15 @@ use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::difference::Difference;
 use crate::differences::{Differences, Look, differences};
+use crate::follower::explained;
 use crate::happening::Happening;
 use crate::named::named;
 use crate::options::{Named, options};
-use crate::remedy::{Remedy, remedies};
+use crate::remedy::{Remedy, doubts, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
-use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
+use backdrive_nodes::stage::Clock;
 use backdrive_stability::bag_gate::models_apart;
 use backdrive_stability::by_itself::alone::AloneError;
 use backdrive_stability::by_itself::compared::SMALL;
@@ -90,6 +92,9 @@ pub struct Answer {
     pub master: Option<String>,
     /// The critical mu*lambda of the recorded loop; `None` where there is none within a factor of 20.
     pub edge: Option<f64>,
+    /// The slave as found, where it differs from the graph and touches what the graph states: a model file.
+    #[serde(skip)]
+    pub slave: Option<String>,
     /// Why the loop was not re-simulated, where it was not.
     pub not_again: Option<String>,
     /// Events that nodes reported while it ran, kinds with their counts.
@@ -111,7 +116,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let contradictory = happening == Happening::NotJudged { why: Unjudged::Contradictory };
     let is_lossy = matches!(happening, Happening::NotJudged { why } if why.is_loss());
     let patience = if is_lossy { Duration::ZERO } else { question.patience };
-    let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience }, hear, cancel)?;
+    let Differences { found, notes } = differences(graph, recorded, &Look { small: small(graph, &happening), patience }, hear, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),
         gain: gain.product(),
@@ -121,7 +126,8 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         beneath: None,
         remedies: Vec::new(),
         differs: found.iter().map(|d| named(d, graph).2).collect(),
-        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
+        master: of_device(&found, NodeKind::Master).and_then(held),
+        slave: of_device(&found, NodeKind::Slave).and_then(|files| alone_in(graph, files)),
         again: None,
         again_signals: None,
         reproduced: false,
@@ -133,6 +139,17 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     };
     if contradictory {
         answer.not_again = Some("the recording contradicts itself or its graph".to_string());
+        of_events(&mut answer, recorded);
+        return Ok(answer);
+    }
+    if let Happening::FollowerStairs { .. } = answer.happening {
+        hear("the follower on its recorded commands");
+        let was = as_recorded(graph, &answer.differences);
+        (answer.causes, answer.remedies, answer.reproduced) = explained(graph, was, &answer.differences, recorded, &answer.happening);
+        answer.again = Some(
+            if answer.reproduced { "the follower, run alone, goes in such stairs" } else { "the follower, run alone, goes smoothly" }
+                .into(),
+        );
         of_events(&mut answer, recorded);
         return Ok(answer);
     }
@@ -155,6 +172,24 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         answer.happens = answer.happening.to_string();
     }
     Ok(answer)
+}
+
+/// A difference that counts, as a share of its signal. In lockstep nothing is left to chance: where something shakes, a smaller difference is one too.
+fn small(graph: &Graph, happening: &Happening) -> f64 {
+    if happening.is_trouble() && graph.timing.clock == Clock::Lockstep { IN_LOCKSTEP * SMALL } else { SMALL }
+}
+
+const IN_LOCKSTEP: f64 = 0.25;
+
+/// The device of a kind as found, where it differs from the graph.
+fn of_device(found: &[Difference], kind: NodeKind) -> Option<&DeviceFiles> {
+    found.iter().filter(|d| d.kind == kind).find_map(|d| d.device.as_ref()?.files.as_deref())
+}
+
+/// A slave as a model file; `None` where what it touches differs too.
+fn alone_in(graph: &Graph, files: &DeviceFiles) -> Option<String> {
+    let stated = graph.nodes.iter().find_map(|n| if let Settings::Slave(stated) = &n.settings { Some(stated) } else { None })?;
+    (stated.fragment == files.fragment).then(|| files.model.as_ref().map(backdrive_plant::model::Model::to_toml)).flatten()
 }
 
 /// A device with what holds it, as a model file.
@@ -193,7 +228,8 @@ fn closer(
     }
     let mut other = Answer {
         differs: found.iter().map(|d| named(d, question.graph).2).collect(),
-        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
+        master: of_device(&found, NodeKind::Master).and_then(held),
+        slave: of_device(&found, NodeKind::Slave).and_then(|files| alone_in(question.graph, files)),
         differences: found,
         causes: Vec::new(),
         remedies: Vec::new(),
@@ -225,11 +261,13 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     let mut shakes_again = answer.reproduced || !run.outcome.is_stable();
     // A limit hides what happens beneath: then the causes are looked for without it.
     let (mut loop_of_causes, mut always, mut happening) = (was.clone(), Vec::new(), answer.happening);
+    let mut does = run.outcome;
     if let Happening::Saturation { .. } = happening {
         let mut unlimited = was.clone();
         Change::NoLimits.apply(&mut unlimited);
         let run = unlimited.run(&hand, *gain, &RunOptions::default(), cancel)?;
         let beneath = Happening::of_run(&run);
+        does = if beneath.is_trouble() { run.outcome } else { does };
         if beneath.is_trouble() {
             (loop_of_causes, always, happening) = (unlimited, vec![Change::NoLimits], beneath);
             shakes_again = true;
@@ -237,9 +275,12 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         answer.beneath = Some(beneath);
     }
     answer.edge = loop_of_causes.edge(&hand, gain.product(), cancel)?.critical_gain;
-    if !answer.happening.is_trouble() {
+    // A loop that was not judged, because of what differs from its graph: what would it do without that?
+    let kept_from_judgement = matches!(answer.happening, Happening::NotJudged { .. }) && !answer.differences.is_empty();
+    if !answer.happening.is_trouble() && !kept_from_judgement {
         return Ok(());
     }
+    shakes_again |= kept_from_judgement;
     hear("without each suspect");
     let asked = Asked {
         graph,
@@ -248,6 +289,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         hand: &hand,
         gain: *gain,
         happening: &happening,
+        again: &does,
         always: &always,
         edge: answer.edge,
         reproduced: answer.reproduced,
@@ -259,7 +301,8 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         return Ok(());
     }
     hear("trying remedies");
-    answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, &answer.causes, cancel)?;
+    let unsure = doubts(&answer.differences);
+    answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, (&answer.causes, &unsure), cancel)?;
     Ok(())
 }
 
@@ -283,6 +326,7 @@ fn of_events(answer: &mut Answer, recorded: &Recorded) {
         without: "not re-simulated: it is not part of a model".to_string(),
         holds_without: false,
         edge_without: None,
+        share: None,
         seen: true,
         confidence: 0.0,
         repairs: Vec::new(),

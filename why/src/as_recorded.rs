@@ -1,10 +1,11 @@
 //! The recorded loop: the graph of a bag with the differences that were found.
 
 use crate::difference::{Difference, delay};
-use crate::faulty::Distortion;
+use crate::faulty::{Distortion, Side};
 use crate::trial::Trial;
-use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};
+use backdrive_nodes::graph::{Direction, Graph, Settings};
 use backdrive_stability::by_itself::compared::AsIf;
+use backdrive_stability::by_itself::shapes::{Filter, Renewal};
 
 /// Puts differences into a graph; those of which nothing simple is known stay out, and are not counted.
 pub fn as_recorded(graph: &Graph, differences: &[Difference]) -> Trial {
@@ -20,20 +21,25 @@ pub fn is_modelled(difference: &Difference) -> bool {
     difference.device.as_ref().is_some_and(|d| d.files.is_some()) || !matches!(difference.compared.as_if, AsIf::Otherwise | AsIf::Same)
 }
 
-fn put(trial: &mut Trial, difference: &Difference) {
+/// Puts a difference into a loop.
+pub fn put(trial: &mut Trial, difference: &Difference) {
     if difference.way.is_some() {
         let Some(node) = trial.graph.nodes.iter().position(|n| n.name == difference.node) else { return };
         delay(&mut trial.graph, node, difference);
-        if let AsIf::Changed { gain, .. } = difference.compared.as_if
-            && gain != 1.0
-        {
-            trial.distortions.push(Distortion { gain, ..of(difference) });
+        let none = of(difference);
+        match difference.compared.as_if {
+            AsIf::Changed { gain, .. } if gain != 1.0 => trial.distortions.push(Distortion { gain, ..none }),
+            AsIf::Held { .. } | AsIf::Filtered { .. } => trial.distortions.extend(into(difference).map(|into| shaped(difference, into))),
+            _ => {}
         }
         return;
     }
     if let Some(found) = difference.device.as_ref().and_then(|d| d.files.as_ref()) {
-        for node in trial.graph.nodes.iter_mut().filter(|n| n.name == difference.node && n.kind == NodeKind::Master) {
-            node.settings = Settings::Master((**found).clone());
+        for node in trial.graph.nodes.iter_mut().filter(|n| n.name == difference.node) {
+            match &mut node.settings {
+                Settings::Master(files) | Settings::Slave(files) => *files = (**found).clone(),
+                _ => {}
+            }
         }
         return;
     }
@@ -44,9 +50,27 @@ fn put(trial: &mut Trial, difference: &Difference) {
         AsIf::Railed { low, high } => Distortion { rails: [low, high], ..none },
         AsIf::Stepped { step } => Distortion { step, ..none },
         AsIf::Noisy { deviation } => Distortion { noise: deviation, ..none },
+        AsIf::Held { .. } | AsIf::Filtered { .. } => shaped(difference, none),
         AsIf::Same | AsIf::Unsteady { .. } | AsIf::Otherwise => return,
     };
     trial.distortions.push(one);
+}
+
+/// With the rate or the low-pass that was found.
+fn shaped(difference: &Difference, none: Distortion) -> Distortion {
+    match difference.compared.as_if {
+        AsIf::Held { rows, phase } => Distortion { hold: Some(Renewal { rows, phase }), ..none },
+        AsIf::Filtered { order, corner_hz } => Distortion { filter: Some(Filter { order, corner_hz }), ..none },
+        _ => none,
+    }
+}
+
+/// The input at the end of a way; `None` where the node has no such port.
+fn into(difference: &Difference) -> Option<Distortion> {
+    let port = difference.way.as_ref()?;
+    let (stage, _) = difference.kind.port(port, Direction::Input)?;
+    let number = difference.kind.stages().get(stage)?.inputs.iter().position(|p| p.name == *port)?;
+    Some(Distortion { stage, side: Side::Input(number), ..Distortion::none(&difference.node, difference.quantity, difference.axis) })
 }
 
 fn of(difference: &Difference) -> Distortion {

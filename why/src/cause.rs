@@ -8,11 +8,13 @@ use crate::as_recorded::{as_recorded, is_modelled};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::difference::Difference;
+use crate::fine::is_fine;
 use crate::happening::Happening;
-use crate::named::named;
+use crate::named::{named, of_number};
 use crate::stated::{Suspect, of_the_graph};
 use crate::trial::{Hand, Trial};
-use backdrive_nodes::graph::{Graph, NodeKind};
+use crate::tuned::Tuned;
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use rayon::prelude::*;
@@ -34,6 +36,8 @@ pub struct Cause {
     pub holds_without: bool,
     /// The critical mu*lambda without it; `None` where there is none up to twenty times the gain.
     pub edge_without: Option<f64>,
+    /// Share of the shaking that goes when this alone is repaired, 0 to 1; `None` where it was not re-simulated.
+    pub share: Option<f64>,
     /// Whether it was seen in the recording, and is not only what the graph states.
     pub seen: bool,
     /// 0 to 1.
@@ -63,6 +67,8 @@ pub struct Asked<'a> {
     pub reproduced: bool,
     /// Whether the recorded loop oscillates at all in its re-simulation. Where it does not, nothing can be learned from leaving a thing out of it.
     pub shakes_again: bool,
+    /// What the loop that causes are looked for in does.
+    pub again: &'a Outcome,
     /// Changes that every run has besides: motors without limits, where a limit hides what happens beneath.
     pub always: &'a [Change],
 }
@@ -89,6 +95,14 @@ const GAIN_BESIDE: f64 = 0.4;
 pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, ResimulateError> {
     let suspects = suspects(asked);
     let gain = asked.gain.product();
+    // Several things may shake a loop each by itself: then it goes on without any one of them, and holds without all.
+    let seen = suspects.iter().filter(|s| s.seen).count();
+    let holds_without_all = seen > 1 && {
+        let mut none = Trial::of(asked.graph.clone());
+        asked.always.iter().for_each(|c| c.apply(&mut none));
+        let run = none.run(asked.hand, asked.gain, &RunOptions::default(), cancel)?;
+        is_fine(&none, asked.hand, asked.gain, &run, cancel)?
+    };
     let judged: Vec<(Cause, f64)> = suspects
         .into_par_iter()
         .map(|mut suspect| {
@@ -102,6 +116,8 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
                 true => edge.map_or(FURTHER, |e| (e / gain).clamp(1.0, FURTHER)),
                 false => taken_along(asked.happening, &run.outcome).filter(|share| *share >= MOST_OF_IT).unwrap_or(NO_EVIDENCE),
             };
+            let share = share_of(asked, &run.outcome);
+            let further = if suspect.seen && holds_without_all { further.max(MOST_OF_IT + 0.5 * share) } else { further };
             let weight = further * if suspect.seen { SEEN } else { 1.0 };
             let cause = Cause {
                 kind: suspect.kind,
@@ -110,6 +126,7 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
                 without: run.outcome.to_string(),
                 holds_without: holds,
                 edge_without: edge,
+                share: asked.shakes_again.then_some(share),
                 seen: suspect.seen,
                 confidence: 0.0,
                 repairs: suspect.repairs,
@@ -118,6 +135,20 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
         })
         .collect::<Result<_, ResimulateError>>()?;
     Ok(weighed(asked, judged.into_iter().chain(unknown(asked)).collect()))
+}
+
+/// Share of the shaking that goes without a thing: all of it where the loop then holds, else by what is left of the amplitude or of the growth.
+fn share_of(asked: &Asked, without: &Outcome) -> f64 {
+    let left = match (asked.again, without) {
+        (_, without) if without.is_stable() => 0.0,
+        (Outcome::LimitCycle { amplitude_m: was, .. }, Outcome::LimitCycle { amplitude_m: left, .. }) => left / was,
+        (Outcome::Unstable { growth_per_s: was }, Outcome::Unstable { growth_per_s: left }) => left / was,
+        // What no longer grows beyond all bounds is less by an amount that has no number.
+        (Outcome::Unstable { .. }, Outcome::LimitCycle { .. }) => 0.5,
+        (Outcome::Limited { clamped_share: was, .. }, Outcome::Limited { clamped_share: left, .. }) => left / was,
+        _ => 1.0,
+    };
+    (1.0 - left).clamp(0.0, 1.0)
 }
 
 /// Share of the amplitude that a thing causes; `None` where the one or the other is no limit cycle.
@@ -140,6 +171,7 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
         without: "not known, because no model in the bag contains it".to_string(),
         holds_without: false,
         edge_without: None,
+        share: None,
         seen,
         confidence: 0.0,
         repairs: Vec::new(),
@@ -161,7 +193,8 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
 
 /// Shares of the weights, with the gain itself as the rest where nothing else explains it.
 fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
-    if !asked.happening.is_trouble() {
+    let judged_by = matches!(asked.happening, Happening::NotJudged { .. });
+    if !asked.happening.is_trouble() && !judged_by {
         return Vec::new();
     }
     let lowered = asked.edge.filter(|edge| *edge < asked.gain.product());
@@ -170,12 +203,16 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         kind: CauseKind::GainTooHigh,
         place: String::new(),
         evidence: match lowered {
+            Some(edge) if !asked.differences.is_empty() => {
+                format!("with everything that differs from the graph the loop is stable only up to mu*lambda = {edge:.3}")
+            }
             Some(edge) => format!("every node behaves as the graph states, and that loop is stable only up to mu*lambda = {edge:.3}"),
             None => "the loop of the graph oscillates at this gain".to_string(),
         },
         without: lowered.map_or_else(|| "no lower gain was found stable".to_string(), |edge| format!("stable below {edge:.3}")),
         holds_without: lowered.is_some(),
         edge_without: lowered,
+        share: None,
         seen: false,
         confidence: 0.0,
         repairs: Vec::new(),
@@ -186,7 +223,11 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         Some(_) => 1.0,
         None => 0.2,
     };
-    judged.push((gain, weight));
+    match judged_by {
+        // Of a loop that was not judged only what was seen in its recording is told.
+        true => judged.retain(|(cause, _)| cause.seen),
+        false => judged.push((gain, weight)),
+    }
     let sum: f64 = judged.iter().map(|(_, w)| w).sum();
     let trust = if asked.reproduced { 1.0 } else { 0.6 };
     let mut causes: Vec<Cause> = judged.into_iter().map(|(c, w)| Cause { confidence: trust * w / sum.max(1e-9), ..c }).collect();
@@ -198,11 +239,24 @@ fn suspects(asked: &Asked) -> Vec<Suspect> {
     let mut all = Vec::new();
     for (number, difference) in asked.differences.iter().enumerate() {
         let others: Vec<Difference> = asked.differences.iter().enumerate().filter(|(i, _)| *i != number).map(|(_, d)| d.clone()).collect();
+        let tuned = difference.device.as_ref().map_or(&[][..], |device| &device.tuned);
+        if !tuned.is_empty() {
+            all.extend(tuned.iter().map(|one| of_tuned(asked, difference, one)));
+            continue;
+        }
         let (kind, place, evidence) = named(difference, asked.graph);
         let repairs = if let Some(port) = &difference.way {
             vec![Change::WayRepaired { node: difference.node.clone(), port: port.clone() }]
-        } else if difference.device.is_some() {
-            Vec::new()
+        } else if let Some(device) = &difference.device {
+            stated(asked.graph, &difference.node).filter(|_| device.files.is_some() && difference.kind == NodeKind::Slave).map_or_else(
+                Vec::new,
+                |files| {
+                    let what = device.physics.first().map_or("it then does what its model states".to_string(), |p| {
+                        format!("remove {} at {}", p.physics.replace('_', " "), p.place)
+                    });
+                    vec![Change::DeviceRepaired { node: difference.node.clone(), what, files: Box::new(files) }]
+                },
+            )
         } else {
             vec![Change::SensorRepaired { node: difference.node.clone() }]
         };
@@ -213,6 +267,24 @@ fn suspects(asked: &Asked) -> Vec<Suspect> {
     }
     all.extend(of_the_graph(asked.graph, asked.was, asked.happening));
     all
+}
+
+/// One number of a device among those that differ.
+fn of_tuned(asked: &Asked, difference: &Difference, number: &Tuned) -> Suspect {
+    let (kind, place, evidence) = of_number(number, &difference.node);
+    let repaired = Change::NumberRepaired { node: difference.node.clone(), knob: number.knob, value: number.value };
+    let mut without = as_recorded(asked.graph, asked.differences);
+    repaired.apply(&mut without);
+    let repairs = if number.knob.can_be_repaired() { vec![repaired] } else { Vec::new() };
+    Suspect { kind, place, evidence, seen: true, without, repairs }
+}
+
+/// A device as its graph states it.
+fn stated(graph: &Graph, node: &str) -> Option<DeviceFiles> {
+    match &graph.node(node)?.settings {
+        Settings::Master(files) | Settings::Slave(files) => Some(files.clone()),
+        _ => None,
+    }
 }
 
 /// Whether the re-simulated loop does what was recorded: the same word, and, where both oscillate, the same frequency.

@@ -22,6 +22,8 @@ pub enum CauseKind {
     Compliance,
     /// Dry friction that was left out.
     DryFriction,
+    /// Dry friction in the follower that makes it go in stairs.
+    Stiction,
     /// Backlash that was left out.
     Backlash,
     /// Hysteresis that was left out.
@@ -42,6 +44,14 @@ pub enum CauseKind {
     WrongSign,
     /// A sensor that is late.
     LateSensor,
+    /// A loop or a signal that is renewed too seldom.
+    Rate,
+    /// One factor on all forces of a device.
+    TorqueConstant,
+    /// A servo that is stronger or weaker than its model.
+    Servo,
+    /// An environment that is stiffer or softer than the graph states.
+    Environment,
     /// A motor at its limit, or a device at the end of its travel.
     Saturation,
     /// The clock of a node.
@@ -64,6 +74,7 @@ impl CauseKind {
             CauseKind::Inertia => "inertia that is missing from the canceller's model",
             CauseKind::Compliance => "compliance that is missing from the canceller's model",
             CauseKind::DryFriction => "dry friction that is missing from the model",
+            CauseKind::Stiction => "stiction in the follower",
             CauseKind::Backlash => "backlash that is missing from the model",
             CauseKind::Hysteresis => "hysteresis that is missing from the model",
             CauseKind::OtherPhysics => "the master differs from the canceller's model",
@@ -74,6 +85,10 @@ impl CauseKind {
             CauseKind::ScaledSensor => "a sensor of the wrong scale",
             CauseKind::WrongSign => "a signal of the wrong sign",
             CauseKind::LateSensor => "a delayed sensor",
+            CauseKind::Rate => "a rate that is too low",
+            CauseKind::TorqueConstant => "a wrong torque constant: one factor on all forces of a device",
+            CauseKind::Servo => "a servo that differs from its model",
+            CauseKind::Environment => "an environment that differs from the graph's",
             CauseKind::Saturation => "a limit of the device",
             CauseKind::Clock => "the clock: a node could not keep its rate",
             CauseKind::TwoPublishers => "two publishers on one topic",

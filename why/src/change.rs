@@ -1,14 +1,18 @@
 //! Changes to a loop that would stop it, as things that can be done to any graph.
 
 use crate::coupled::couple;
+use crate::faulty::{Distortion, Side};
+use crate::knob::Knob;
 use crate::trial::Trial;
 use backdrive_control::coupling::LawKind;
 use backdrive_control::hand::HandSettings;
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_diagnosis::physics::physics_named;
-use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::{Element, Fragment, Model};
+use backdrive_stability::by_itself::recorded::Quantity;
+use backdrive_stability::outcome::Unit;
 use backdrive_stability::resimulate::grip;
 use serde::Serialize;
 
@@ -67,6 +71,62 @@ pub enum Change {
         /// The node that reads it.
         node: String,
     },
+    /// One number of a device is that of its model.
+    NumberRepaired {
+        /// The device's node.
+        node: String,
+        /// Which number.
+        knob: Knob,
+        /// The value that it has.
+        value: f64,
+    },
+    /// A device is as its model states.
+    DeviceRepaired {
+        /// Its node.
+        node: String,
+        /// What is repaired, for a person.
+        what: String,
+        /// The device as its graph states it.
+        #[serde(skip)]
+        files: Box<DeviceFiles>,
+    },
+    /// Signals that are renewed too seldom have a higher rate.
+    Renewals {
+        /// Factor.
+        factor: f64,
+        /// Their rate then, Hz.
+        hz: f64,
+    },
+    /// Signals that are renewed too seldom go on a straight line to each new value instead of a step.
+    Interpolated,
+    /// A stiffer servo of the follower.
+    Servo {
+        /// Factor on its forces.
+        factor: f64,
+    },
+    /// The follower's command leads on the side to which it moves, by what its sliding friction bends its servo.
+    FeedForward {
+        /// m or rad.
+        by: f64,
+        /// Which of them.
+        unit: Unit,
+    },
+    /// A sine on the follower's command.
+    Dither {
+        /// Amplitude, m or rad.
+        by: f64,
+        /// Hz.
+        hz: f64,
+        /// Unit of the amplitude.
+        unit: Unit,
+    },
+    /// The follower without its dry friction: not to be had, but it shows what the friction does.
+    FollowerWithoutFriction,
+    /// What the slave touches is stiffer or softer.
+    Wall {
+        /// Factor on its forces.
+        factor: f64,
+    },
     /// Sensors that neither round nor are noisy.
     FinerSensors,
     /// The motor compensates dry friction between the master's bodies and ground, where it is known.
@@ -122,6 +182,7 @@ impl Change {
             Change::WayRepaired { node, port } => {
                 let Some(index) = trial.graph.nodes.iter().position(|n| n.name == *node) else { return };
                 trial.graph.connections.iter_mut().filter(|c| c.to.0 == index && c.to.1 == *port).for_each(|c| c.impairment = None);
+                trial.distortions.retain(|d| d.node != *node || d.hold.is_none() && d.filter.is_none());
             }
             Change::Delays { factor } => {
                 for connection in &mut trial.graph.connections {
@@ -136,6 +197,28 @@ impl Change {
                 }
             }
             Change::SensorRepaired { node } => trial.distortions.retain(|d| d.node != *node),
+            Change::NumberRepaired { node, knob: Knob::CommandDelay, value } => undelayed(&mut trial.graph, node, *value),
+            Change::NumberRepaired { node, knob, value } => device(&mut trial.graph, node, |files| knob.undo(files, *value)),
+            Change::DeviceRepaired { node, files: stated, .. } => device(&mut trial.graph, node, |files| *files = (**stated).clone()),
+            Change::Servo { factor } => followers(&mut trial.graph, |files| Knob::Servo.put(files, *factor)),
+            Change::FollowerWithoutFriction => followers(&mut trial.graph, |files| {
+                files.model.iter_mut().for_each(|m| m.elements.retain(|e| !is_friction_to_ground(e)));
+            }),
+            Change::FeedForward { by, .. } => commanded(trial, |d| d.lead = *by),
+            Change::Dither { by, hz, .. } => commanded(trial, |d| d.dither = [*by, *hz]),
+            Change::Renewals { factor, .. } => {
+                for hold in trial.distortions.iter_mut().filter_map(|d| d.hold.as_mut()) {
+                    hold.rows = (hold.rows / factor).max(1.0);
+                }
+            }
+            Change::Interpolated => trial.distortions.iter_mut().filter(|d| d.hold.is_some()).for_each(|d| d.ramps = true),
+            Change::Wall { factor } => {
+                for node in trial.graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Slave) {
+                    if let Settings::Slave(files) = &mut node.settings {
+                        files.fragment.iter_mut().for_each(|f| f.scale(*factor));
+                    }
+                }
+            }
             Change::FinerSensors => {
                 for node in &mut trial.graph.nodes {
                     if let Settings::Master(files) | Settings::Slave(files) = &mut node.settings {
@@ -156,6 +239,13 @@ impl Change {
                 let times = hz / trial.graph.timing.rate_hz;
                 trial.graph.timing.rate_hz = *hz;
                 trial.graph.timing.steps = trial.graph.timing.steps.map(|s| (s as f64 * times).round() as u64);
+                for distortion in &mut trial.distortions {
+                    distortion.late = (distortion.late as f64 * times).round() as usize;
+                    distortion.dead_from = distortion.dead_from.map(|row| (row as f64 * times).round() as usize);
+                    if let Some(hold) = &mut distortion.hold {
+                        (hold.rows, hold.phase) = (hold.rows * times, hold.phase * times);
+                    }
+                }
                 // Delays of whole steps are of the network where there are several, and of the clock where there is one.
                 for connection in trial.graph.connections.iter_mut().filter(|c| c.delay > 1) {
                     connection.delay = (connection.delay as f64 * times).round() as u64;
@@ -173,6 +263,12 @@ impl Change {
                 }
             }
         }
+    }
+
+    /// Whether it puts right what was found to differ from the graph, and does nothing else.
+    pub fn is_repair(&self) -> bool {
+        use Change::*;
+        matches!(self, WayRepaired { .. } | SensorRepaired { .. } | NumberRepaired { .. } | DeviceRepaired { .. })
     }
 
     /// Whether it does the same as another, however the two are called.
@@ -204,13 +300,31 @@ impl std::fmt::Display for Change {
             }
             Change::HighPass { .. } => write!(f, "remove the high-pass from the canceller's estimate (high_pass_hz = 0)"),
             Change::WayRepaired { node, port } => {
-                write!(f, "repair the connection to {node}.{port}: no more delay, jitter or loss than the graph states")
+                write!(
+                    f,
+                    "repair the connection to {node}.{port}: no more delay, jitter, loss or filter than the graph states, and its full rate"
+                )
             }
             Change::Delays { factor } if *factor == 0.0 => write!(f, "remove the delays, jitter and loss that the graph states"),
             Change::Delays { factor } => {
                 write!(f, "reduce delays, jitter and loss to {:.0} % of what the graph states", 100.0 * factor)
             }
             Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
+            Change::NumberRepaired { node, knob, .. } => write!(f, "{}", knob.repair(node)),
+            Change::DeviceRepaired { node, what, .. } => write!(f, "repair {node}: {what}"),
+            Change::Servo { factor } => write!(f, "make the follower's servo {factor:.0} times as stiff"),
+            Change::FeedForward { by, unit } => {
+                write!(
+                    f,
+                    "let the follower's command lead by {} on the side to which it moves: a feed-forward of its sliding friction",
+                    unit.text(*by)
+                )
+            }
+            Change::Dither { by, hz, unit } => write!(f, "add a dither of {} at {hz:.0} Hz to the follower's command", unit.text(*by)),
+            Change::FollowerWithoutFriction => write!(f, "remove the follower's dry friction"),
+            Change::Renewals { hz, .. } => write!(f, "renew the signal that is held at {hz:.0} Hz"),
+            Change::Interpolated => write!(f, "interpolate the held signal on a straight line to each new value, instead of a step"),
+            Change::Wall { factor } => write!(f, "touch something {factor:.1} times as stiff"),
             Change::Coupling { law } => {
                 let law = law.name();
                 write!(f, "couple master and slave by {} instead of scaling and canceller (--coupling {law})", law.replace('_', " "))
@@ -225,6 +339,60 @@ impl std::fmt::Display for Change {
             Change::Rate { hz } => write!(f, "run the loop at {hz:.0} Hz"),
             Change::NoLimits => write!(f, "remove all limits"),
             Change::StrongerMotor => write!(f, "use a stronger motor"),
+        }
+    }
+}
+
+fn followers(graph: &mut Graph, change: impl Fn(&mut DeviceFiles)) {
+    for node in &mut graph.nodes {
+        if let Settings::Slave(files) = &mut node.settings {
+            change(files);
+        }
+    }
+}
+
+/// Puts a distortion on the command of each axis of each slave.
+fn commanded(trial: &mut Trial, change: impl Fn(&mut Distortion)) {
+    let slaves = trial.graph.nodes.iter().filter(|n| n.kind == NodeKind::Slave);
+    let all: Vec<Distortion> = slaves
+        .flat_map(|node| {
+            (0..node.axes).map(|axis| Distortion { side: Side::Input(0), ..Distortion::none(&node.name, Quantity::Position, axis) })
+        })
+        .map(|mut one| {
+            change(&mut one);
+            one
+        })
+        .collect();
+    trial.distortions.extend(all);
+}
+
+/// Takes a delay off a slave's command: in front of its servo, and what is more than the delay there off the connection.
+fn undelayed(graph: &mut Graph, node: &str, delay_s: f64) {
+    let mut rest = 0.0;
+    for node in graph.nodes.iter_mut().filter(|n| n.name == node) {
+        let Settings::Slave(DeviceFiles { model: Some(model), .. }) = &mut node.settings else { continue };
+        let feedbacks: Vec<usize> = model.axes.iter().map(|a| a.feedback).collect();
+        for input in feedbacks {
+            if let Some(input) = model.inputs.get_mut(input) {
+                let taken = delay_s.min(input.delay.max(0.0));
+                input.delay -= taken;
+                rest = delay_s - taken;
+            }
+        }
+    }
+    let Some(index) = graph.nodes.iter().position(|n| n.name == node) else { return };
+    for way in graph.connections.iter_mut().filter(|c| c.to.0 == index && c.to.1 == "command") {
+        if let Some(impairment) = &mut way.impairment {
+            impairment.delay_s = (impairment.delay_s - rest).max(0.0);
+        }
+    }
+}
+
+/// Changes the files of a master or a slave.
+fn device(graph: &mut Graph, node: &str, change: impl Fn(&mut DeviceFiles)) {
+    for node in graph.nodes.iter_mut().filter(|n| n.name == node) {
+        if let Settings::Master(files) | Settings::Slave(files) = &mut node.settings {
+            change(files);
         }
     }
 }

@@ -1,12 +1,14 @@
-//! What a master does that its model does not: a diagnosis of the recorded loop, with the force on the motor and the hand as what was put in.
+//! What a device does that its model does not: a diagnosis of the recorded loop. Of a master the force on the motor and the hand are what was put in, of a
+//! slave the command and the force of what it touches.
 
+use crate::tuned::Tuned;
 use backdrive_diagnosis::hypothesis::{Family, Place};
 use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::output_error::candidate::{Candidate, price};
 use backdrive_diagnosis::recordings::problem::{Problem, Record};
 use backdrive_diagnosis::search::search;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings as NodeSettings};
-use backdrive_plant::model::Model;
+use backdrive_plant::model::{Hold, Input, InputKind, Model};
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Initial;
 use backdrive_stability::by_itself::recorded::{Quantity, Recorded};
@@ -32,6 +34,8 @@ pub struct DeviceFound {
     pub physics: Vec<PhysicsFound>,
     /// Parameters of the model that differ: path, value in the model, true value.
     pub numbers: Vec<NumberFound>,
+    /// Numbers of the device as a whole that explain it by themselves, each a cause of its own.
+    pub tuned: Vec<Tuned>,
     /// The device with all that.
     #[serde(skip)]
     pub files: Option<Box<DeviceFiles>>,
@@ -67,50 +71,25 @@ pub struct NumberFound {
     pub of_grip: bool,
 }
 
-/// Diagnoses the master of a graph by its bag. `None` where the bag cannot say: the hand was not recorded, or there is no model.
-pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, stop: &AtomicBool) -> Option<DeviceFound> {
-    let master = graph.nodes.iter().position(|n| n.kind == NodeKind::Master)?;
-    let NodeSettings::Master(DeviceFiles { model: Some(model), fragment, substeps, real_sensors, .. }) = &graph.nodes[master].settings
-    else {
-        return None;
-    };
-    let (held, hands) = match fragment {
-        Some(grip) => model.held_by(grip),
-        None => (model.clone(), model.own_hands()),
-    };
-    let topic = |port: &str| graph.topic_of(master, port).name;
-    let measured = recorded.track(&topic("measured"))?;
-    let wanted = graph.connections.iter().find(|c| c.to.0 == master && c.to.1 == "intent").map(|c| c.topic.name.clone());
-    let intent = wanted.and_then(|t| recorded.track(&t));
+/// What a diagnosis starts from.
+struct Given {
+    /// The device with what holds it.
+    held: Model,
+    signals: Vec<(String, Vec<f64>)>,
+}
+
+/// Diagnoses a device of a graph by its bag. `None` where the bag cannot say: an input was not recorded, or there is no model.
+pub fn diagnose(graph: &Graph, node: usize, recorded: &Recorded, patience: Duration, stop: &AtomicBool) -> Option<DeviceFound> {
+    let (NodeSettings::Master(devices) | NodeSettings::Slave(devices)) = &graph.nodes.get(node)?.settings else { return None };
+    let DeviceFiles { model: Some(model), fragment, substeps, real_sensors, .. } = devices else { return None };
+    let is_master = graph.nodes[node].kind == NodeKind::Master;
     let slave =
         graph.nodes.iter().position(|n| n.kind == NodeKind::Slave).and_then(|i| recorded.track(&graph.topic_of(i, "measured").name));
     let touch = slave.and_then(|t| t.effort.iter().filter_map(|c| c.iter().position(|f| f.is_finite() && *f != 0.0)).min());
     let enough = touch.map_or(ROWS, |row| row + (AFTER_TOUCH_S / graph.period_s()) as usize);
     let rows = enough.min(ROWS).min(recorded.rows);
-    let whole = |column: &[f64]| -> Option<Vec<f64>> {
-        let mut before = column.iter().copied().find(|x| x.is_finite())?;
-        Some(
-            column[..rows.min(column.len())]
-                .iter()
-                .map(|x| {
-                    before = if x.is_finite() { *x } else { before };
-                    before
-                })
-                .collect(),
-        )
-    };
-    let mut signals = Vec::new();
-    for (index, axis) in held.axes.iter().enumerate() {
-        let input = held.inputs.get(axis.feedback)?;
-        signals.push((input.name.clone(), whole(measured.column(Quantity::Effort, index))?));
-        let output = held.outputs.get(axis.measured)?;
-        let position = whole(measured.column(Quantity::Position, index))?;
-        signals.push((output.name.clone(), position.iter().map(|x| x / axis.scale).collect()));
-        if let Some((_, hand)) = hands.iter().find(|(number, _)| *number == index) {
-            let hand = held.inputs.get(*hand)?;
-            signals.push((hand.name.clone(), whole(intent?.column(Quantity::Position, index))?));
-        }
-    }
+    let Given { held, signals } =
+        if is_master { of_master(graph, node, devices, recorded, rows)? } else { of_slave(graph, node, model, recorded, rows)? };
     let period = graph.period_s();
     let rows = signals.iter().map(|s| s.1.len()).min()?;
     let recording = Recording {
@@ -122,12 +101,17 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
         units: Vec::new(),
     };
     let text = held.to_toml();
-    let model = Model::from_toml(&text, "the master with its grip").ok()?;
+    let model = Model::from_toml(&text, "the device with what holds it").ok()?;
     let record = Record::new(&recording, &model, Vec::new()).ok()?;
-    let problem = Problem::new(text, "master.toml".into(), model, vec![record], Vec::new(), Initial::Rest).ok()?;
-    let files = |model: Model| DeviceFiles {
-        model: Some(model),
-        fragment: None,
+    let problem = Problem::new(text, "device.toml".into(), model, vec![record], Vec::new(), Initial::Rest).ok()?;
+    let contact = |model: &mut Model| model.inputs.retain(|input| is_master || !input.name.starts_with(TOUCHED));
+    let files = |mut model: Model| DeviceFiles {
+        model: Some({
+            contact(&mut model);
+            model
+        }),
+        // What a slave touches is no part of its diagnosis.
+        fragment: fragment.clone().filter(|_| !is_master),
         substeps: *substeps,
         real_sensors: *real_sensors,
         grip_changes: Vec::new(),
@@ -160,9 +144,72 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
         word: if best.physics.is_empty() { "unexplained" } else { "missing" }.to_string(),
         sentence,
         numbers: numbers.filter(|n| (n.found - n.declared).abs() > 0.03 * n.declared.abs()).collect(),
+        tuned: Vec::new(),
         physics: best.physics,
         files: best.model.map(|model| Box::new(files(model))),
     })
+}
+
+/// Name of the input that carries the force of what a slave touches, before the number of its axis.
+const TOUCHED: &str = "touched_";
+
+/// A column without gaps, each value held; `None` where there is no value.
+fn whole(column: &[f64], rows: usize) -> Option<Vec<f64>> {
+    let mut before = column.iter().copied().find(|x| x.is_finite())?;
+    let one = |x: &f64| {
+        before = if x.is_finite() { *x } else { before };
+        before
+    };
+    Some(column[..rows.min(column.len())].iter().map(one).collect())
+}
+
+fn of_master(graph: &Graph, node: usize, files: &DeviceFiles, recorded: &Recorded, rows: usize) -> Option<Given> {
+    let model = files.model.as_ref()?;
+    let (held, hands) = match &files.fragment {
+        Some(grip) => model.held_by(grip),
+        None => (model.clone(), model.own_hands()),
+    };
+    let measured = recorded.track(&graph.topic_of(node, "measured").name)?;
+    let wanted = graph.connections.iter().find(|c| c.to.0 == node && c.to.1 == "intent").map(|c| c.topic.name.clone());
+    let intent = wanted.and_then(|t| recorded.track(&t));
+    let mut signals = Vec::new();
+    for (index, axis) in held.axes.iter().enumerate() {
+        let input = held.inputs.get(axis.feedback)?;
+        signals.push((input.name.clone(), whole(measured.column(Quantity::Effort, index), rows)?));
+        let output = held.outputs.get(axis.measured)?;
+        let position = whole(measured.column(Quantity::Position, index), rows)?;
+        signals.push((output.name.clone(), position.iter().map(|x| x / axis.scale).collect()));
+        if let Some((_, hand)) = hands.iter().find(|(number, _)| *number == index) {
+            let hand = held.inputs.get(*hand)?;
+            signals.push((hand.name.clone(), whole(intent?.column(Quantity::Position, index), rows)?));
+        }
+    }
+    Some(Given { held, signals })
+}
+
+fn of_slave(graph: &Graph, node: usize, model: &Model, recorded: &Recorded, rows: usize) -> Option<Given> {
+    let measured = recorded.track(&graph.topic_of(node, "measured").name)?;
+    let way = graph.connections.iter().find(|c| c.to.0 == node && c.to.1 == "command")?;
+    let command = recorded.track(&way.topic.name)?;
+    let period = graph.period_s();
+    let late = way.delay as usize + way.impairment.map_or(0, |i| (i.delay_s / period).round() as usize);
+    let mut held = model.clone();
+    let mut signals = Vec::new();
+    for (index, axis) in model.axes.iter().enumerate() {
+        let input = held.inputs.get(axis.feedback)?.name.clone();
+        let sent = whole(command.column(Quantity::Position, index), rows)?;
+        let first = *sent.first()?;
+        let came: Vec<f64> = (0..sent.len()).map(|row| row.checked_sub(late).map_or(first, |row| sent[row])).collect();
+        signals.push((input, came));
+        let output = held.outputs.get(axis.measured)?.name.clone();
+        let position = whole(measured.column(Quantity::Position, index), rows)?;
+        signals.push((output, position.iter().map(|x| x / axis.scale).collect()));
+        let touched = format!("{TOUCHED}{index}");
+        let force = whole(measured.column(Quantity::Effort, index), rows)?;
+        signals.push((touched.clone(), force));
+        held.inputs.push(Input::ideal(&touched, InputKind::Force, axis.user, Hold::Linear));
+    }
+    Some(Given { held, signals })
 }
 
 /// Another explanation counts where it leaves so much less.

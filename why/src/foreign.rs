@@ -7,11 +7,12 @@ use crate::change::Change;
 use crate::happening::Happening;
 use crate::remedy::Remedy;
 use backdrive_stability::by_itself::compared::{AsIf, Sensor, compare};
+use backdrive_stability::coupling::Coupling;
 use backdrive_stability::frequency;
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::edge::Search;
 use backdrive_stability::session::{AxisSignals, Session};
-use backdrive_stability::verdict::{Question, Swapped, answer, is_coupled};
+use backdrive_stability::verdict::{CoupledAxis, Question, Swapped, answer, is_coupled};
 use std::sync::atomic::AtomicBool;
 
 /// A lower gain is this share of the measured critical gain.
@@ -23,10 +24,17 @@ const LEAST_LATE: usize = 3;
 /// Answers for a session that was read by a roles file: what happens, how late and how large each way is, and the critical gain of the measured loop.
 /// There is no re-simulation, because no model of the loop is known.
 pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
-    let happening = happening_of(session, gain);
+    let (happening, coupled) = happening_of(session, gain);
     let (measured, mut notes) = measured(session, gain);
     let edge = measured.edge;
-    let mut causes: Vec<(Cause, f64)> = session.axes.iter().flat_map(|axis| of_axis(axis, session, gain, &happening)).collect();
+    // Of two coupled motors the law that moves each of them is known; of other recordings the two ways.
+    let laws: Vec<(&str, &Coupling)> = coupled.iter().filter_map(|c| Some((c.axis.as_str(), c.coupling.as_ref()?))).collect();
+    let mut causes: Vec<(Cause, f64)> = if laws.is_empty() {
+        session.axes.iter().flat_map(|axis| of_axis(axis, session, gain, &happening)).collect()
+    } else {
+        notes.extend(laws.iter().map(|(axis, law)| format!("axis {axis}: {}", law.lines().join("; "))));
+        laws.iter().flat_map(|(axis, law)| of_law(axis, law, session.period_s, &happening)).collect()
+    };
     // The signal of a dead sensor is not in the loop; whether the loop needed it is not known.
     let dead = session.sensors.iter().map(|fault| (cause(CauseKind::DeadSensor, fault.signal.clone(), fault.to_string(), false), DEAD));
     causes.extend(dead);
@@ -61,6 +69,7 @@ pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
         again_signals: None,
         reproduced: false,
         master: None,
+        slave: None,
         edge,
         not_again: measured.why_not,
         events: Vec::new(),
@@ -71,8 +80,8 @@ pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
 /// A dead sensor that may be no part of the loop weighs so much.
 const DEAD: f64 = 0.3;
 
-/// What happens; for a pair of coupled motors the judgement while the hand moves.
-fn happening_of(session: &Session, gain: Gain) -> Happening {
+/// What happens; for a pair of coupled motors the judgement while the hand moves, and the law of either motor.
+fn happening_of(session: &Session, gain: Gain) -> (Happening, Vec<CoupledAxis>) {
     let judged = is_coupled(session).then(|| {
         let question = Question {
             session,
@@ -85,12 +94,44 @@ fn happening_of(session: &Session, gain: Gain) -> Happening {
             grips: Vec::new(),
             search: Search::default(),
         };
-        answer(&question, &|_, _, _| {}, &AtomicBool::new(false)).ok()?.recorded_outcome
+        let answer = answer(&question, &|_, _, _| {}, &AtomicBool::new(false)).ok()?;
+        Some((answer.recorded_outcome?, answer.coupled))
     });
     match judged.flatten() {
-        Some(outcome) => Happening::of_outcome(outcome, &[]),
-        None => Happening::of(session, session.len()),
+        Some((outcome, coupled)) => (Happening::of_outcome(outcome, &[]), coupled),
+        None => (Happening::of(session, session.len()), Vec::new()),
     }
+}
+
+/// What the recovered laws of two motors say: a sign that pushes them apart, a delay, a slow filter of speeds, a clamp.
+fn of_law(axis: &str, law: &Coupling, period_s: f64, happening: &Happening) -> Vec<(Cause, f64)> {
+    let mut all = Vec::new();
+    for (side, name) in [(&law.master, "master"), (&law.slave, "slave")] {
+        let at = |kind: CauseKind, text: String| cause(kind, format!("axis {axis}, {name}"), text, false);
+        if side.pushes_apart() {
+            all.push((at(CauseKind::WrongSign, format!("the {name}'s motor pushes the two sides apart: a sign is wrong")), 6.0));
+        }
+        // Of half a period of what oscillates, which is what it takes to turn a loop round.
+        let share = |late_s: f64| happening.frequency_hz().map_or(0.5, |hz| (2.0 * hz * late_s).min(3.0));
+        let delays = [(side.delay_s, "the positions"), (side.force_delay_s, "the measured forces")];
+        for (late, of) in delays.iter().filter_map(|(delay, of)| Some((delay.as_ref()?, of))) {
+            // One step is what every sampled loop has.
+            if late.ci95[0] > LEAST_LATE as f64 * period_s {
+                let [low, high] = late.ci95.map(|s| 1e3 * s);
+                let text = format!("the {name}'s motor uses {of} {:.1} ms late (95 %: {low:.1} to {high:.1} ms)", 1e3 * late.value);
+                all.push((at(CauseKind::Delay, text), share(late.value)));
+            }
+        }
+        if let Some(filter) = side.filter_s.as_ref().filter(|f| f.ci95[0] > LEAST_LATE as f64 * period_s) {
+            let corner = 1.0 / (std::f64::consts::TAU * filter.value);
+            let text = format!("the {name}'s law filters speeds at {corner:.1} Hz, which is a lag of {:.1} ms", 1e3 * filter.value);
+            all.push((at(CauseKind::FilterLag, text), 0.5 * share(filter.value)));
+        }
+        if let (Some(limit), Happening::Saturation { .. }) = (side.limit, happening) {
+            all.push((at(CauseKind::Saturation, format!("the {name}'s motor is clamped at {limit:.3}")), 2.0));
+        }
+    }
+    all
 }
 
 /// A result without a re-simulation is not certain.
@@ -116,7 +157,18 @@ fn measured(session: &Session, gain: Gain) -> (Measured, Vec<String>) {
 
 fn cause(kind: CauseKind, place: String, evidence: String, holds_without: bool) -> Cause {
     let without = "not re-simulated: no model of the loop is known".to_string();
-    Cause { kind, place, evidence, without, holds_without, edge_without: None, seen: true, confidence: 0.0, repairs: Vec::new() }
+    Cause {
+        kind,
+        place,
+        evidence,
+        without,
+        holds_without,
+        edge_without: None,
+        share: None,
+        seen: true,
+        confidence: 0.0,
+        repairs: Vec::new(),
+    }
 }
 
 /// What an axis' signals say of its two ways: from the master's position to the command, and from the contact force to the master.
@@ -150,6 +202,19 @@ fn of_axis(axis: &AxisSignals, session: &Session, gain: Gain, happening: &Happen
                 all.push((at(CauseKind::DeadSensor, text), 6.0));
             }
             AsIf::Railed { .. } => all.push((at(CauseKind::Saturation, format!("{what} saturates, while {of} moves on")), 2.0)),
+            AsIf::Held { rows, .. } => {
+                let (hz, loop_hz) = (1.0 / (rows * session.period_s), 1.0 / session.period_s);
+                let text = format!("{what} is renewed at {hz:.1} Hz only, and {of} at {loop_hz:.0} Hz");
+                // Held values are half a renewal late on average.
+                let share = happening.frequency_hz().map_or(0.5, |f| (f / hz).min(3.0));
+                all.push((at(CauseKind::Rate, text), share));
+            }
+            AsIf::Filtered { corner_hz, .. } => {
+                let text = format!("{what} is {of} behind a low-pass of {corner_hz:.1} Hz");
+                // Its lag is an eighth of a period at the corner.
+                let share = happening.frequency_hz().map_or(0.5, |f| (f / corner_hz).min(3.0));
+                all.push((at(CauseKind::FilterLag, text), share));
+            }
             AsIf::Unsteady { .. } | AsIf::Changed { .. } | AsIf::Stepped { .. } | AsIf::Noisy { .. } | AsIf::Same | AsIf::Otherwise => {}
         }
     }

@@ -1,5 +1,6 @@
 //! What happens in a recording, before any question of why.
 
+use crate::stairs::of_session;
 use backdrive_stability::judgement::frequency_hz;
 use backdrive_stability::oscillation::oscillation;
 use backdrive_stability::outcome::{Outcome, Trace, Unit};
@@ -62,6 +63,17 @@ pub enum Happening {
         /// Unit of the amplitude.
         unit: Unit,
     },
+    /// The follower goes in stairs while its command moves evenly.
+    FollowerStairs {
+        /// Size of one step, m or rad.
+        step: f64,
+        /// Steps per second.
+        frequency_hz: f64,
+        /// Share of the time in which it stands while its command moves.
+        stands: f64,
+        /// Unit of the step.
+        unit: Unit,
+    },
     /// A clamp acts, or the device leaves its travel.
     Saturation {
         /// Share of the steps in contact in which a clamp acted.
@@ -85,6 +97,14 @@ impl Happening {
         for trace in &mut traces {
             trace.position.truncate(rows);
             trace.contact.truncate(rows);
+        }
+        // A follower that sticks and slips does so by itself, and needs no loop.
+        let calm =
+            matches!(outcome, Outcome::Stable | Outcome::NotJudged { why: Unjudged::NoContact | Unjudged::NoFeedback | Unjudged::NoHold });
+        if (calm || session.is_one_way())
+            && let Some((found, unit)) = of_session(session)
+        {
+            return Happening::FollowerStairs { step: found.step, frequency_hz: found.frequency_hz, stands: found.stands, unit };
         }
         // Whatever else kept it from being judged, it was no loop.
         if session.is_one_way() && matches!(outcome, Outcome::NotJudged { .. }) {
@@ -131,6 +151,7 @@ impl Happening {
         match self {
             Happening::Ringing { frequency_hz, .. }
             | Happening::LimitCycle { frequency_hz, .. }
+            | Happening::FollowerStairs { frequency_hz, .. }
             | Happening::Stairs { frequency_hz, .. } => Some(*frequency_hz),
             Happening::RunAway { frequency_hz, .. } => Some(*frequency_hz),
             _ => None,
@@ -159,6 +180,12 @@ impl std::fmt::Display for Happening {
             Happening::Stairs { amplitude_m, frequency_hz, unit } => {
                 write!(f, "stick-slip of ±{}, {frequency_hz:.1} times a second", unit.text(*amplitude_m))
             }
+            Happening::FollowerStairs { step, frequency_hz, stands, unit } => write!(
+                f,
+                "the follower goes in stairs of {}, {frequency_hz:.1} times a second, and stands for {:.0} % of the time while its command moves",
+                unit.text(*step),
+                100.0 * stands
+            ),
             Happening::Saturation { clamped_share, beyond_travel } => {
                 let travel = if *beyond_travel { ", and the master leaves its travel" } else { "" };
                 write!(f, "a limit acts in {:.1} % of the contact{travel}", 100.0 * clamped_share)

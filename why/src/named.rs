@@ -3,6 +3,7 @@
 use crate::cause_kind::CauseKind;
 use crate::device::{DeviceFound, NumberFound, PhysicsFound};
 use crate::difference::Difference;
+use crate::tuned::Tuned;
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_stability::by_itself::compared::AsIf;
@@ -33,6 +34,14 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
             AsIf::Unsteady { late: 0, missing, .. } => {
                 (CauseKind::Loss, place, format!("{:.1} % of the input {node}.{port} is lost", 100.0 * missing))
             }
+            AsIf::Held { rows, .. } => (CauseKind::Rate, place, held(&format!("the input {node}.{port}"), rows, period_s)),
+            AsIf::Filtered { order, corner_hz } => (
+                CauseKind::FilterLag,
+                place,
+                format!(
+                    "the input {node}.{port} comes through a low-pass of {corner_hz:.1} Hz (order {order}) that the graph does not state"
+                ),
+            ),
             AsIf::Unsteady { late, .. } | AsIf::Changed { late, .. } => (
                 CauseKind::Delay,
                 place,
@@ -42,7 +51,7 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
         };
     }
     if let Some(device) = &difference.device {
-        return of_device(device, node, share);
+        return of_device(device, (node, difference.kind == NodeKind::Master), share);
     }
     let place = node.clone();
     match difference.compared.as_if {
@@ -59,6 +68,12 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
         AsIf::Noisy { deviation } => {
             (CauseKind::CoarseSensor, place, format!("{what} at {node} has noise of {deviation:.3e} rms, which is not in its model"))
         }
+        AsIf::Held { rows, .. } => (CauseKind::Rate, place, held(&format!("{what} at {node}"), rows, period_s)),
+        AsIf::Filtered { order, corner_hz } => (
+            CauseKind::FilterLag,
+            place,
+            format!("{what} at {node} comes through a low-pass of {corner_hz:.1} Hz (order {order}) that is not in its model"),
+        ),
         AsIf::Changed { gain, late: 0 } if gain < 0.0 => {
             (CauseKind::WrongSign, place, format!("{what} at {node} is {gain:.2} times the model's value: its sign is wrong"))
         }
@@ -79,8 +94,24 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
     }
 }
 
-/// The diagnosis of the master, as a cause.
-fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String, String) {
+fn held(what: &str, rows: f64, period_s: f64) -> String {
+    let (hz, graph) = (1.0 / (rows * period_s), 1.0 / period_s);
+    format!("{what} is renewed at {hz:.1} Hz and held in between; the graph states {graph:.0} Hz")
+}
+
+/// One number of a device, as a cause.
+pub fn of_number(number: &Tuned, node: &str) -> (CauseKind, String, String) {
+    let give = if number.give.is_finite() && number.give < 0.5 * number.value.abs() {
+        let unit = if number.knob.is_time() { format!("{:.2} ms", 1e3 * number.give) } else { format!("{:.3}", number.give) };
+        format!(" (within {unit})")
+    } else {
+        String::new()
+    };
+    (number.knob.cause(number.value), node.to_string(), format!("{node}: {}{give}", number.knob.words(number.value)))
+}
+
+/// The diagnosis of a device, as a cause.
+fn of_device(device: &DeviceFound, (node, is_master): (&str, bool), share: f64) -> (CauseKind, String, String) {
     let kind_of = |f: &PhysicsFound| match (f.family, f.of_signal) {
         (Some(Family::Friction), _) => CauseKind::DryFriction,
         (Some(Family::Hysteresis), _) => CauseKind::Hysteresis,
@@ -88,20 +119,26 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
         (Some(Family::Inertia), _) => CauseKind::Inertia,
         (Some(Family::Compliance), _) => CauseKind::Compliance,
         (Some(Family::Scale), _) => CauseKind::ScaledSensor,
+        (Some(Family::Lag), true) if !is_master => CauseKind::Delay,
         (Some(Family::Lag), true) => CauseKind::LateSensor,
         (Some(Family::Limit), true) => CauseKind::Saturation,
         _ => CauseKind::OtherPhysics,
     };
+    if let Some(first) = device.tuned.first() {
+        let (kind, place, _) = of_number(first, node);
+        let all: Vec<String> = device.tuned.iter().map(|n| n.knob.words(n.value)).collect();
+        return (kind, place, format!("{node} differs by {share:.0} % from its model: {}", all.join(", and ")));
+    }
     let size = |f: &PhysicsFound| f.size.as_ref().map_or_else(String::new, |(name, value, unit)| format!(", {name} {value:.4} {unit}"));
     if let Some(first) = device.physics.first() {
         let text = format!(
-            "the master differs by {share:.0} % from its model; a diagnosis of the bag finds {} at {}{} (confidence {})",
+            "{node} differs by {share:.0} % from its model; a diagnosis of the bag finds {} at {}{} (confidence {})",
             first.physics.replace('_', " "),
             first.place,
             size(first),
             backdrive_diagnosis::verdict::words::share(first.confidence)
         );
-        return (kind_of(first), first.place.clone(), text);
+        return (kind_of(first), if is_master { first.place.clone() } else { format!("{node}, {}", first.place) }, text);
     }
     let moved = |n: &NumberFound| (n.found / n.declared).abs().ln().abs();
     let most = device.numbers.iter().filter(|n| n.declared != 0.0 && n.found != 0.0).max_by(|a, b| moved(a).total_cmp(&moved(b)));
@@ -114,15 +151,13 @@ fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String
             } else {
                 CauseKind::OtherPhysics
             };
-            let text = format!(
-                "the master differs by {share:.0} % from its model: {} is {:.4}, and {:.4} in the graph",
-                n.path, n.found, n.declared
-            );
+            let text =
+                format!("{node} differs by {share:.0} % from its model: {} is {:.4}, and {:.4} in the graph", n.path, n.found, n.declared);
             (kind, n.path.clone(), text)
         }
         None => {
             let text = format!(
-                "the master differs by {share:.0} % from its model, and a diagnosis of the bag does not explain it: {}",
+                "{node} differs by {share:.0} % from its model, and a diagnosis of the bag does not explain it: {}",
                 device.sentence
             );
             (CauseKind::Unknown, node.to_string(), text)

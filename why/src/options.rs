@@ -64,6 +64,15 @@ fn of(change: &Change, named: &Named) -> Option<Vec<Word>> {
         Change::WayRepaired { .. }
         | Change::Delays { .. }
         | Change::SensorRepaired { .. }
+        | Change::NumberRepaired { .. }
+        | Change::DeviceRepaired { .. }
+        | Change::Wall { .. }
+        | Change::Servo { .. }
+        | Change::FeedForward { .. }
+        | Change::Dither { .. }
+        | Change::FollowerWithoutFriction
+        | Change::Renewals { .. }
+        | Change::Interpolated
         | Change::FinerSensors
         | Change::Damping { .. }
         | Change::FrictionCompensated { .. }

@@ -3,20 +3,25 @@
 use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
 use crate::change::{Change, is_friction_to_ground};
+use crate::difference::Difference;
+pub use crate::fine::is_fine;
 use crate::options::Word;
 use crate::throw::Throw;
 use crate::trial::{Hand, Trial};
 use backdrive_control::coupling::LawKind;
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
-use backdrive_stability::outcome::Outcome;
-use backdrive_stability::resimulate::{Gain, ResimulateError, Run, RunOptions};
+use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
-/// A remedy has to hold with hands that grip so firmly, as factors on the grip of the bag: a user's grip is not known better.
-const FIRMNESS: [f64; 3] = [1.0, 0.85, 1.15];
+/// A remedy is robust if it holds with hands that grip so firmly, as factors on the grip of the bag: a user changes the grip by as much from one moment to
+/// the next.
+const GRIPS: [f64; 2] = [0.7, 1.5];
+
+/// And on walls so stiff, as factors on what the slave touched.
+const WALLS: [f64; 2] = [0.5, 2.0];
 
 /// And at a gain so much higher.
 const MARGIN: f64 = 1.25;
@@ -47,7 +52,8 @@ pub struct Remedy {
     pub outcome: String,
     /// Whether it is stable then, with the hand of the bag and at its gain.
     pub stops: bool,
-    /// Whether it is stable with a hand 15 % softer and firmer too, and at a gain a quarter higher.
+    /// Whether it is stable with grips of 0.7 to 1.5 times, on walls of 0.5 to 2 times, with every cause at either end of its interval, and at a gain a
+    /// quarter higher too.
     pub robust: bool,
     /// Share of the reflected force that is left, 0 to 1: against lambda times the contact force, with the lambda of the bag.
     pub force_kept: f64,
@@ -72,7 +78,8 @@ impl Remedy {
     }
 }
 
-/// Tries what would stop a loop; the best first. `recorded` is the loop as recorded, `causes` are the likeliest first.
+/// Tries what would stop a loop; the best first. `recorded` is the loop as recorded, `causes` are the likeliest first, and
+/// `doubts` are how large or small they may be: see [`doubts`].
 ///
 /// # Errors
 /// A loop that cannot be run; `cancel` was set.
@@ -82,11 +89,15 @@ pub fn remedies(
     hand: &Hand,
     gain: Gain,
     edge: Option<f64>,
-    causes: &[Cause],
+    (causes, doubts): (&[Cause], &[Change]),
     cancel: &AtomicBool,
 ) -> Result<Vec<Remedy>, ResimulateError> {
     let free = free_motion(was, hand, gain, cancel)?;
-    let tried = candidates(was, gain, edge, causes);
+    let mut tried = candidates(was, gain, edge, causes);
+    // Of a loop that was not judged it is only known that what differs is to be put right.
+    if causes.iter().all(|c| c.kind != CauseKind::GainTooHigh) {
+        tried.retain(|(changes, repairs)| *repairs && changes.iter().all(Change::is_repair));
+    }
     let one = |(changes, repairs_cause): &(Vec<Change>, bool)| -> Result<Option<Remedy>, ResimulateError> {
         let mut trial = was.clone();
         changes.iter().for_each(|c| c.apply(&mut trial));
@@ -98,16 +109,7 @@ pub fn remedies(
             Err(_) => return Ok(None),
         };
         let stops = is_fine(&trial, hand, own, &run, cancel)?;
-        let mut robust = stops;
-        if stops {
-            for factor in FIRMNESS.iter().filter(|f| **f != 1.0) {
-                let mut held = trial.clone();
-                Change::Grip { factor: *factor }.apply(&mut held);
-                robust &= holds(&held, hand, own, cancel)?;
-            }
-            let higher = Gain { lambda: own.lambda * if lowers(changes) { 1.0 } else { MARGIN }, ..own };
-            robust &= holds(&trial, hand, higher, cancel)?;
-        }
+        let robust = stops && robust(&trial, hand, own, (lowers(changes), doubts), cancel)?;
         let (force_kept, motion_kept) =
             run.signals.as_ref().map_or((0.0, 0.0), |s| (force_kept(s, gain.lambda), motion_kept(s, &free, gain.mu)));
         Ok(Some(Remedy {
@@ -132,13 +134,49 @@ pub fn remedies(
     all.retain(|r| {
         let kind = r.changes.first().map(std::mem::discriminant);
         let again = r.changes.len() == 1
-            && matches!(r.changes.first(), Some(Change::Damping { .. } | Change::Grip { .. } | Change::Gain { .. }))
+            && matches!(
+                r.changes.first(),
+                Some(Change::Damping { .. } | Change::Grip { .. } | Change::Gain { .. } | Change::Renewals { .. })
+            )
             && kinds.contains(&kind);
         kinds.push(kind);
         !again
     });
     all.iter_mut().skip(1).for_each(|r| r.signals = None);
     Ok(all)
+}
+
+/// Whether a loop holds with other grips, on other walls, with every cause as large or small as it may be, and at a higher gain unless lowering it is what
+/// was done.
+fn robust(
+    trial: &Trial,
+    hand: &Hand,
+    gain: Gain,
+    (lowers, doubts): (bool, &[Change]),
+    cancel: &AtomicBool,
+) -> Result<bool, ResimulateError> {
+    let grips = GRIPS.iter().map(|factor| Change::Grip { factor: *factor });
+    let walls = WALLS.iter().map(|factor| Change::Wall { factor: *factor });
+    for other in grips.chain(walls).chain(doubts.iter().cloned()) {
+        let mut changed = trial.clone();
+        other.apply(&mut changed);
+        if !holds(&changed, hand, gain, cancel)? {
+            return Ok(false);
+        }
+    }
+    let higher = Gain { lambda: gain.lambda * MARGIN, ..gain };
+    Ok(lowers || holds(trial, hand, higher, cancel)?)
+}
+
+/// Each number of a device that was found, at either end of its interval.
+pub fn doubts(differences: &[Difference]) -> Vec<Change> {
+    let numbers = differences.iter().flat_map(|d| d.device.iter().flat_map(|device| &device.tuned).map(move |n| (&d.node, n)));
+    let unsure = numbers.filter(|(_, n)| !n.knob.is_time() && n.give.is_finite() && n.give.abs() < 0.5 * n.value.abs());
+    let ends = unsure.flat_map(|(node, n)| {
+        let share = n.give / n.value.abs();
+        [1.0 + share, 1.0 - share].map(|factor| Change::NumberRepaired { node: node.clone(), knob: n.knob, value: 1.0 / factor })
+    });
+    ends.collect()
 }
 
 /// What stops it without a throw comes first, then what stops it with one, then by what is kept: what holds with other hands too counts more, and what puts
@@ -213,6 +251,11 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
     }
     if graph.connections.iter().any(|c| c.impairment.is_some() || c.delay > 1) {
         all.extend([0.5, 0.25].map(|factor| (vec![Change::Delays { factor }], false)));
+    }
+    if let Some(hold) = was.distortions.iter().find_map(|d| d.hold) {
+        let own = graph.timing.rate_hz / hold.rows;
+        all.extend([2.0, 4.0, 10.0].map(|factor| (vec![Change::Renewals { factor, hz: factor * own }], true)));
+        all.push((vec![Change::Interpolated], false));
     }
     if graph.node_of(NodeKind::Scaling).is_some() {
         all.extend(COUPLINGS.map(|law| (vec![Change::Coupling { law }], false)));
@@ -292,19 +335,6 @@ fn motion_kept(session: &Session, free: &Option<Session>, mu: f64) -> f64 {
 
 fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
     is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
-}
-
-/// Whether nothing oscillates: a limit may act, where nothing would happen without it.
-///
-/// # Errors
-/// As a run.
-pub fn is_fine(trial: &Trial, hand: &Hand, gain: Gain, run: &Run, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
-    if !matches!(run.outcome, Outcome::Limited { beyond_travel: false, .. }) {
-        return Ok(run.outcome.is_stable());
-    }
-    let mut unlimited = trial.clone();
-    Change::NoLimits.apply(&mut unlimited);
-    Ok(unlimited.run(hand, gain, &RunOptions::default(), cancel)?.outcome.is_stable())
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
     let hz = graph.timing.rate_hz;
     if hz < LOW_RATE_HZ {
         add(
-            CauseKind::Delay,
+            CauseKind::Rate,
             "rate".to_string(),
             format!("the loop runs at {hz:.0} Hz: one step is {:.1} ms", 1e3 / hz),
             vec![Change::Rate { hz: 10.0 * hz }],

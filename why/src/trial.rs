@@ -6,6 +6,8 @@ use backdrive_control::operator::Intent;
 use backdrive_msgs::source_id;
 use backdrive_nodes::build::cores_of;
 use backdrive_nodes::graph::{Graph, Node};
+use backdrive_stability::by_itself::alone::{AloneError, PutOut, alone, alone_with};
+use backdrive_stability::by_itself::recorded::Recorded;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
 use backdrive_stability::resimulate::{Gain, OwnCores, ResimulateError, Run, RunOptions, Scenario};
@@ -81,6 +83,18 @@ impl Trial {
         }))
     }
 
+    /// One of its nodes by itself, on its recorded inputs.
+    ///
+    /// # Errors
+    /// A node that cannot be built.
+    pub fn alone(&self, name: &str, recorded: &Recorded) -> Result<Vec<PutOut>, AloneError> {
+        let own = self.graph.node(name).and_then(|node| self.cores()?(&self.graph, node, 1.0));
+        match own {
+            Some(Ok(cores)) => alone_with(&self.graph, name, recorded, cores),
+            _ => alone(&self.graph, name, recorded),
+        }
+    }
+
     /// Runs it at a gain.
     ///
     /// # Errors
@@ -123,7 +137,7 @@ fn wrapped(cores: Vec<Box<dyn Core>>, graph: &Graph, node: &Node, distortions: &
     let seed = graph.seed.wrapping_add(u64::from(source_id(&node.name)));
     let around = |(stage, core): (usize, Box<dyn Core>)| -> Box<dyn Core> {
         let here: Vec<Distortion> = distortions.iter().filter(|d| d.stage == stage).cloned().collect();
-        if here.is_empty() { core } else { Box::new(Faulty::new(core, &here, seed)) }
+        if here.is_empty() { core } else { Box::new(Faulty::new(core, &here, graph.period_s(), seed)) }
     };
     cores.into_iter().enumerate().map(around).collect()
 }

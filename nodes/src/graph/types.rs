@@ -110,7 +110,7 @@ pub struct Node {
 }
 
 /// A simulated device's files, read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DeviceFiles {
     /// The model; `None` for a canceller that subtracts nothing, and for a device that only the user's own program knows.
     pub model: Option<Model>,

@@ -292,7 +292,7 @@ fn contradiction(place: &Place, graph: &Graph, recorded: &[f64], predicted: &[f6
         AsIf::Same => true,
         AsIf::Unsteady { late, jitter, missing } => is_realtime && late + jitter <= bridged && missing < SMALL_IN_REALTIME,
         AsIf::Changed { gain, late } => is_realtime && late <= bridged && (gain - 1.0).abs() < SMALL_IN_REALTIME,
-        AsIf::Dead { .. } => false,
+        AsIf::Dead { .. } | AsIf::Held { .. } | AsIf::Filtered { .. } => false,
         AsIf::Railed { .. } | AsIf::Stepped { .. } | AsIf::Noisy { .. } | AsIf::Otherwise => {
             is_realtime && compared.share < UNEXPLAINED_IN_REALTIME
         }
@@ -325,6 +325,8 @@ fn differs(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f6
         AsIf::Changed { gain, .. } => format!("{gain:.4} times"),
         AsIf::Dead { .. } => "constant, unlike".to_owned(),
         AsIf::Unsteady { .. } => "irregularly delayed against".to_owned(),
+        AsIf::Held { rows, .. } => format!("renewed at {:.1} Hz only, unlike", 1.0 / (rows * place.period_s)),
+        AsIf::Filtered { corner_hz, .. } => format!("low-pass filtered at {corner_hz:.1} Hz, unlike"),
         _ if is_factor => format!("{gain:.4} times"),
         _ => format!("{:.0} % different from", 100.0 * compared.share),
     };

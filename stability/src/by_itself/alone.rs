@@ -8,7 +8,7 @@ use super::recorded::{Recorded, Track};
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Gains, Sample};
-use backdrive_nodes::build::{BuildError, plan};
+use backdrive_nodes::build::{BuildError, plan, plan_with};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::sequence::{Sequence, SequenceError};
 use backdrive_nodes::stage::{NodePlan, OutputPort, Stage};
@@ -72,7 +72,10 @@ pub(crate) struct Alone {
 impl Alone {
     /// Joins a node to players. `recorded` has the number of axes of each input.
     pub(crate) fn new(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Alone, AloneError> {
-        let node = plan(graph, name)?;
+        Alone::of(plan(graph, name)?, graph, recorded)
+    }
+
+    fn of(node: NodePlan, graph: &Graph, recorded: &Recorded) -> Result<Alone, AloneError> {
         let side = |part: &str| Topic { name: format!("/recorded/{part}"), kind: Kind::Event };
         let mut inputs: Vec<Topic> = Vec::new();
         for port in node.stages.iter().flat_map(|s| &s.inputs) {
@@ -132,6 +135,14 @@ impl Alone {
 /// A node that cannot be built, such as one that only the user's own program knows.
 pub fn alone(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Vec<PutOut>, AloneError> {
     Ok(Alone::new(graph, name, recorded)?.run(recorded, recorded.first, &[]))
+}
+
+/// The same of a node whose cores the caller brings, one per stage.
+///
+/// # Errors
+/// As [`alone`]; another number of cores than the node has stages.
+pub fn alone_with(graph: &Graph, name: &str, recorded: &Recorded, cores: Vec<Box<dyn Core>>) -> Result<Vec<PutOut>, AloneError> {
+    Ok(Alone::of(plan_with(graph, name, cores)?, graph, recorded)?.run(recorded, recorded.first, &[]))
 }
 
 fn is_own(node: &NodePlan, topic: &Topic) -> bool {

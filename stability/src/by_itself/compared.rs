@@ -1,5 +1,6 @@
 //! A recorded signal compared with its expected value: the size of the difference, and which simple change would explain it.
 
+use super::shapes::{filter, renewal};
 use super::ways::{MOST_LATE, MOST_LATE_S, unsteady};
 use backdrive_signal::statistics::rms;
 use serde::Serialize;
@@ -42,6 +43,20 @@ pub enum AsIf {
         jitter: usize,
         /// Share of the samples that never came, 0 to 1, beside those that another one overtook.
         missing: f64,
+    },
+    /// It is renewed at a rate of its own, slower than the graph's, and held in between.
+    Held {
+        /// Rows from one renewal to the next; not always a whole number.
+        rows: f64,
+        /// Row of one of them.
+        phase: f64,
+    },
+    /// A low-pass lies in its way.
+    Filtered {
+        /// 1 or 2.
+        order: usize,
+        /// Corner, Hz.
+        corner_hz: f64,
     },
     /// The difference is noise.
     Noisy {
@@ -91,6 +106,9 @@ pub const SMALL: f64 = 0.02;
 /// A simple thing explains a difference where it leaves no more of it than this.
 const EXPLAINS: f64 = 0.1;
 
+/// An even delay of a way leaves next to nothing.
+const EXACT: f64 = 1e-3;
+
 /// Delays that are tried row by row: the best places of a coarse look, and all up to this one.
 const PLACES: usize = 6;
 const NEAR: usize = 60;
@@ -120,6 +138,20 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     let share = error / scale;
     let said = |as_if: AsIf, left: f64| Some(Compared { error, share, as_if, left });
     let missing = missing_share(recorded, predicted);
+    // What is renewed at a rate of its own is not lost at random.
+    if error > 0.0 || missing > 0.0 {
+        let found = renewal(recorded, predicted).map(|r| (r, share_left(recorded, &r.of(predicted), scale)));
+        if let Some((renewed, left)) = found.filter(|(_, left)| *left <= SMALL.max(EXPLAINS * share).min(0.5 * share.max(missing))) {
+            return said(AsIf::Held { rows: renewed.rows, phase: renewed.phase }, left);
+        }
+    }
+    // Values on a sensor's grid come again: an even delay that explains all of them is no jitter.
+    if sensor.exact && error > 0.0 && missing < SMALL {
+        let (gain, late, left) = changed(recorded, predicted, scale, period_s);
+        if late > 0 && gain == 1.0 && left <= EXACT * share {
+            return said(AsIf::Changed { gain, late }, left);
+        }
+    }
     // A loss may be small beside a signal that rests, and is there nevertheless.
     if sensor.exact
         && (error > 0.0 || missing > 0.0)
@@ -147,7 +179,16 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     }
     let (gain, late, left) = changed(recorded, predicted, scale, period_s);
     let good = (SMALL.max(3.0 * floor / scale)).max(EXPLAINS * share).min(0.5 * share);
-    if left <= good && (late > 0 || (gain - 1.0).abs() > SMALL) {
+    let is_changed = left <= good && (late > 0 || (gain - 1.0).abs() > SMALL);
+    // A low-pass is late too: it is told from a delay by what it leaves.
+    if (!is_changed || late > 0 && left > 0.1 * good)
+        && let Some((found, rest)) = filter(recorded, predicted, scale, period_s)
+        && rest <= good
+        && (!is_changed || rest < 0.5 * left)
+    {
+        return said(AsIf::Filtered { order: found.order, corner_hz: found.corner_hz }, rest);
+    }
+    if is_changed {
         return said(AsIf::Changed { gain, late }, left);
     }
     let differences: Vec<f64> = both.iter().map(|r| recorded[*r] - predicted[*r]).collect();
@@ -155,6 +196,11 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
         return said(AsIf::Noisy { deviation: error }, 0.0);
     }
     said(AsIf::Otherwise, share)
+}
+
+/// What is left of the difference to a changed prediction, as a share of the signal's size.
+fn share_left(recorded: &[f64], made: &[f64], scale: f64) -> f64 {
+    rms(recorded.iter().zip(made).filter(|(r, m)| r.is_finite() && m.is_finite()).map(|(r, m)| r - m)) / scale
 }
 
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {

@@ -8,5 +8,6 @@ pub mod alone;
 pub mod compared;
 mod devices;
 pub mod recorded;
+pub mod shapes;
 mod ways;
 mod windows;

@@ -122,6 +122,16 @@ impl Recorded {
         rest
     }
 
+    /// The first `rows` rows.
+    #[must_use]
+    pub fn until(mut self, rows: usize) -> Recorded {
+        if rows < self.rows {
+            self.rows = rows;
+            self.tracks.iter_mut().for_each(|t| t.reach(rows));
+        }
+        self
+    }
+
     /// The rows before everything leaves all bounds: `bounds` is what a position of `topic` keeps within. What comes after is no motion of a device any
     /// more, and outweighs everything before it.
     pub fn bounded(mut self, topic: &str, bounds: f64) -> Recorded {

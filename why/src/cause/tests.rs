@@ -6,6 +6,8 @@ use backdrive_stability::outcome::Unit;
 
 const CYCLE: Happening = Happening::LimitCycle { amplitude_m: 1e-3, frequency_hz: 40.0, unit: Unit::Metre };
 
+const AGAIN: Outcome = Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 40.0, unit: Unit::Metre };
+
 fn hand() -> Hand {
     Hand { intents: None, steps: 1000, rate_hz: 5000.0 }
 }
@@ -18,6 +20,7 @@ fn judged(kind: CauseKind, weight: f64) -> (Cause, f64) {
         without: String::new(),
         holds_without: true,
         edge_without: None,
+        share: None,
         seen: true,
         confidence: 0.0,
         repairs: Vec::new(),
@@ -28,7 +31,7 @@ fn judged(kind: CauseKind, weight: f64) -> (Cause, f64) {
 /// What is asked of the loop of a graph that shakes at mu*lambda = 0.3.
 fn asked<'a>(graph: &'a Graph, was: &'a Trial, hand: &'a Hand, happening: &'a Happening, edge: Option<f64>) -> Asked<'a> {
     let gain = Gain { mu: 1.0, lambda: 0.3 };
-    Asked { graph, was, differences: &[], hand, gain, happening, edge, reproduced: true, shakes_again: true, always: &[] }
+    Asked { graph, was, differences: &[], hand, gain, happening, edge, reproduced: true, shakes_again: true, again: &AGAIN, always: &[] }
 }
 
 #[test]
@@ -99,7 +102,7 @@ fn a_graph_is_suspected_of_what_it_states_and_of_nothing_else() {
         all.into_iter().map(|s| (s.kind, s.place)).filter(|(kind, _)| *kind != CauseKind::CoarseSensor).collect::<Vec<_>>()
     };
     assert_eq!(of(&[], &CYCLE), []);
-    assert_eq!(of(&[("rate_hz = 5000", "rate_hz = 500")], &CYCLE), [(CauseKind::Delay, "rate".to_string())]);
+    assert_eq!(of(&[("rate_hz = 5000", "rate_hz = 500")], &CYCLE), [(CauseKind::Rate, "rate".to_string())]);
     let delay = ("to = \"slave.command\"", "to = \"slave.command\"\nimpair = { delay_s = 0.02 }");
     assert_eq!(of(&[delay], &CYCLE), [(CauseKind::Delay, "slave.command".to_string())]);
     let grip = ("kind = \"canceller\"\nmodel = \"../plant/models/impulse-engine.toml\"\ngrip = \"../plant/grips/normal.toml\"", "");

@@ -76,7 +76,8 @@ fn the_diagnosis_of_the_master_decides_the_cause_by_its_first_effect_or_its_most
     let graph = contact(&[]);
     let device = |physics: Vec<PhysicsFound>, numbers: Vec<NumberFound>| {
         let mut found = difference("master", NodeKind::Master, Quantity::Position, AsIf::Otherwise, None);
-        found.device = Some(DeviceFound { word: "missing".into(), sentence: "it differs".into(), physics, numbers, files: None });
+        found.device =
+            Some(DeviceFound { word: "missing".into(), sentence: "it differs".into(), physics, numbers, tuned: Vec::new(), files: None });
         let (kind, place, _) = named(&found, &graph);
         (kind, place)
     };

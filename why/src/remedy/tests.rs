@@ -30,6 +30,7 @@ fn cause(kind: CauseKind, seen: bool, repairs: Vec<Change>) -> Cause {
         without: text(),
         holds_without: true,
         edge_without: None,
+        share: None,
         seen,
         confidence: 0.5,
         repairs,
