@@ -37,6 +37,10 @@ fn text(found: &Gated) -> String {
     for (title, outcome) in [("changed", Outcome::Failed), ("not known", Outcome::Uncertain)] {
         lines.extend(found.with(outcome).map(|check| format!("{title:9} {}", check.sentence)));
     }
+    let open: Vec<String> = found.with(Outcome::NotJudged).map(|check| format!("{} {}", check.place, check.quantity)).collect();
+    if !open.is_empty() {
+        lines.push(format!("not judged, for the old recordings do not determine them to within their bounds: {}", open.join(", ")));
+    }
     lines.extend(found.notes.iter().map(|note| format!("note      {note}")));
     let passed = found.with(Outcome::Passed).count();
     lines.push(match ended(found) {

@@ -186,8 +186,8 @@ fn multiple(rows: &Rows, change: &Change) -> Option<Figure> {
         plot = plot.band("other units", &x(&others), &y(&others, 0.1), &y(&others, 0.9));
     }
     plot = match by_month {
-        true => plot.line(&format!("unit {}", change.unit), &x(&own), &y(&own, 0.5)),
-        false => plot.points(&format!("unit {}", change.unit), &x(&own), &y(&own, 0.5)),
+        true => plot.line(&change.unit, &x(&own), &y(&own, 0.5)),
+        false => plot.points(&change.unit, &x(&own), &y(&own, 0.5)),
     };
     if let Some(since) = Date::parse(&change.since) {
         plot = plot.vertical(place(since), "change", Tone::Bad);

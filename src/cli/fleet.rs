@@ -37,7 +37,7 @@ pub struct Fleet {
     #[arg(long, value_name = "I/N", default_value = "1/1", value_parser = shard)]
     pub shard: Shard,
     /// The folder for answers, verdicts and the table.
-    #[arg(long, value_name = "DIR", required_unless_present = "html")]
+    #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Threads; without it one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]

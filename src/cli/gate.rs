@@ -13,7 +13,7 @@ of a loop. Of bags of a loop the stability limits are compared. A bound is a lin
 [joints.elbow] has those of one joint. Every bound and its default: docs/fleet.md.
 
 Exit codes: 0 no change beyond the bounds, 1 a change beyond them, 2 usage, 3 a recording, a model or the bounds are wrong,
-5 a file cannot be written, 7 not known: the recordings do not determine a quantity to within its bound.";
+5 a file cannot be written, 7 not known: the new recordings do not determine a quantity to within its bound, and the old ones do.";
 
 /// `backdrive gate`
 #[derive(Debug, Args)]

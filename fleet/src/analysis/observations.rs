@@ -10,6 +10,11 @@ const WARM_UP: [f64; 6] = [60.0, 120.0, 300.0, 600.0, 1200.0, 2400.0];
 /// Recordings that a slope takes at the least, beside one for each unit.
 const LEAST_FREE: usize = 8;
 
+/// Sweeps over units and dates that take both levels out: far more than the few that converge.
+const SWEEPS: usize = 20;
+/// Share of the covariate's squares within units that has to differ between units of one date.
+const LEAST_OWN: f64 = 0.05;
+
 /// An estimate from one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
@@ -102,27 +107,66 @@ impl Observations {
         self.units.values().map(|unit| unit.iter().map(of).collect()).collect()
     }
 
-    /// The slope within units, its standard error, and the squares that are left. Levels of units do not enter.
+    /// The slope, its standard error, and a measure of what is left. Levels of units and of dates do not enter, so that a change of the whole fleet is
+    /// not laid on the weather; where units of one date do not differ in the covariate, successive recordings of a unit are compared.
     fn slope(&self, x: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
-        let free = self.count().checked_sub(self.units.len() + 1).filter(|free| *free >= LEAST_FREE)?;
-        let centred = |values: Vec<f64>| {
-            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-            values.into_iter().map(move |value| value - mean)
-        };
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for (unit, x) in self.units.values().zip(x) {
-            let y = centred(unit.iter().map(|observation| observation.value).collect());
-            for (x, y) in centred(x.clone()).zip(y) {
-                xx += x * x;
-                xy += x * y;
-                yy += y * y;
+        let (mut xs, mut ys, mut unit_of, mut day_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut days: BTreeMap<i64, usize> = BTreeMap::new();
+        for (index, (unit, x)) in self.units.values().zip(x).enumerate() {
+            for (observation, x) in unit.iter().zip(x) {
+                let next = days.len();
+                day_of.push(observation.date.map(|date| *days.entry(date.days()).or_insert(next)));
+                unit_of.push(Some(index));
+                xs.push(*x);
+                ys.push(observation.value);
             }
         }
-        if xx <= 1e-12 * x.iter().flatten().map(|x| x * x).sum::<f64>() || xx == 0.0 {
+        let squares = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>();
+        let mut within = xs.clone();
+        centre(&mut within, &unit_of);
+        if squares(&within) <= 1e-12 * squares(&xs) || self.count() < self.units.len() + 1 + LEAST_FREE {
             return None;
         }
-        let left = (yy - xy * xy / xx).max(0.0);
-        Some((xy / xx, (left / free as f64 / xx).sqrt(), left))
+        let (mut x_own, mut y_own) = (xs.clone(), ys.clone());
+        for _ in 0..SWEEPS {
+            for values in [&mut x_own, &mut y_own] {
+                centre(values, &unit_of);
+                centre(values, &day_of);
+            }
+        }
+        let free = xs.len().saturating_sub(self.units.len() + days.len());
+        if free >= LEAST_FREE && squares(&x_own) > LEAST_OWN * squares(&within) {
+            let xx = squares(&x_own);
+            let slope = x_own.iter().zip(&y_own).map(|(x, y)| x * y).sum::<f64>() / xx;
+            let left = (squares(&y_own) - slope * slope * xx).max(0.0);
+            return Some((slope, (left / free as f64 / xx).sqrt(), left));
+        }
+        self.by_successive(x)
+    }
+
+    /// The slope by differences of successive recordings, least absolute deviations: a step is in one difference only.
+    fn by_successive(&self, x: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
+        let mut ratios: Vec<(f64, f64, f64)> = Vec::new();
+        for (unit, x) in self.units.values().zip(x) {
+            for (pair, x) in unit.windows(2).zip(x.windows(2)) {
+                let (dx, dy) = (x[1] - x[0], pair[1].value - pair[0].value);
+                if dx != 0.0 {
+                    ratios.push((dy / dx, dx, dy));
+                }
+            }
+        }
+        ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half = 0.5 * ratios.iter().map(|(_, dx, _)| dx.abs()).sum::<f64>();
+        let mut sum = 0.0;
+        let (slope, ..) = *ratios.iter().find(|(_, dx, _)| {
+            sum += dx.abs();
+            sum >= half
+        })?;
+        let left: Vec<f64> = ratios.iter().map(|(_, dx, dy)| dy - slope * dx).collect();
+        let xx: f64 = ratios.iter().map(|(_, dx, _)| dx * dx).sum();
+        // Least absolute deviations have √(π/2) times the error of least squares where residuals are normal.
+        let sd = (std::f64::consts::FRAC_PI_2 / xx).sqrt() * super::statistics::robust_deviation(&left);
+        Some((slope, sd, left.iter().map(|x| x.abs()).sum()))
     }
 
     /// Takes the covariate out: values are those at its mean over all recordings.
@@ -132,6 +176,23 @@ impl Observations {
             for (observation, x) in unit.iter_mut().zip(x) {
                 observation.value -= slope * (x - mean);
             }
+        }
+    }
+}
+
+/// Takes the mean of each group out; a value without a group stays.
+fn centre(values: &mut [f64], group: &[Option<usize>]) {
+    let count = group.iter().flatten().max().map_or(0, |most| most + 1);
+    let mut sums = vec![(0.0, 0.0); count];
+    for (value, group) in values.iter().zip(group) {
+        if let Some(sum) = group.and_then(|group| sums.get_mut(group)) {
+            sum.0 += value;
+            sum.1 += 1.0;
+        }
+    }
+    for (value, group) in values.iter_mut().zip(group) {
+        if let Some((sum, count)) = group.and_then(|group| sums.get(group)) {
+            *value -= sum / count;
         }
     }
 }

@@ -11,7 +11,7 @@ const CERTAIN: f64 = 1.0;
 /// "unit 17, elbow: dry friction +18 % since 3 November 2026 (95 %: 11 to 25 %)".
 pub fn sentence_of_change(change: &Change, parameter: Parameter, is_servo: bool) -> String {
     let day = |text: &str| Date::parse(text).map_or_else(|| text.to_string(), Date::words);
-    let who = if change.unit == "all units" { change.unit.clone() } else { format!("unit {}", change.unit) };
+    let who = named(&change.unit);
     let rises = match change.shape {
         Shape::Step => "since",
         Shape::Ramp => "in steady drift since",
@@ -62,12 +62,18 @@ fn digits(value: f64) -> String {
     }
 }
 
+/// A unit as a reader calls it.
+fn named(unit: &str) -> String {
+    let is_named = unit == "all units" || unit.to_lowercase().starts_with("unit");
+    if is_named { unit.to_string() } else { format!("unit {unit}") }
+}
+
 /// "unit 17, elbow: dry friction 3.1 N m, where the fleet has 1.2 N m".
 pub fn sentence_of_odd(odd: &Odd, parameter: Parameter, is_servo: bool) -> String {
     let unit = parameter.unit(is_servo);
     format!(
-        "unit {}, {}: {} {} {unit}, where the fleet has {} {unit} (95 % of the difference: {} to {})",
-        odd.unit,
+        "{}, {}: {} {} {unit}, where the fleet has {} {unit} (95 % of the difference: {} to {})",
+        named(&odd.unit),
         odd.joint,
         parameter.said(is_servo),
         digits(odd.value),

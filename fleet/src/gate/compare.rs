@@ -48,8 +48,7 @@ fn of_joint(joint: &str, old: &[TableRow], new: &[TableRow], bounds: &Bounds, ou
                     Of::Dry => bound * dry,
                     Of::Unit => bound,
                 };
-                let sd = (va + vb).sqrt();
-                out.push(judged(kind, joint, quantity, (a, b), sd, size, old.iter().any(TableRow::is_servo)));
+                out.push(judged(kind, joint, quantity, [(a, va), (b, vb)], size, old.iter().any(TableRow::is_servo)));
             }
             Kind::Stability => {}
             _ => out.extend(of_scale(kind, joint, quantity, old, new, bound)),
@@ -105,12 +104,17 @@ fn level(rows: &[TableRow], quantity: &str) -> Option<(f64, usize)> {
     (!values.is_empty()).then(|| (median(&values), values.len()))
 }
 
-/// Fails where the difference is beyond the bound and no chance; uncertain where its error alone is as large as the bound.
-fn judged(kind: Kind, joint: &str, quantity: &str, (old, new): (f64, f64), sd: f64, bound: f64, is_servo: bool) -> Check {
+/// Fails where the difference is beyond the bound and no chance. A quantity counts where the error of the old side allows to see a change of the bound's
+/// size; it is uncertain where that of the new side does not.
+fn judged(kind: Kind, joint: &str, quantity: &str, sides: [(f64, f64); 2], bound: f64, is_servo: bool) -> Check {
+    let [(old, of_old), (new, of_new)] = sides;
+    let sd = (of_old + of_new).sqrt();
     let off = new - old;
     let outcome = if off.abs() > bound && off.abs() > CLEAR * sd {
         Outcome::Failed
-    } else if CLEAR * sd > bound && off.abs() + CLEAR * sd > bound {
+    } else if CLEAR * of_old.sqrt() > bound {
+        Outcome::NotJudged
+    } else if CLEAR * of_new.sqrt() > bound {
         Outcome::Uncertain
     } else {
         Outcome::Passed
@@ -129,7 +133,7 @@ fn judged(kind: Kind, joint: &str, quantity: &str, (old, new): (f64, f64), sd: f
         short(off + 1.96 * sd),
         short(bound)
     );
-    if outcome == Outcome::Uncertain {
+    if matches!(outcome, Outcome::Uncertain | Outcome::NotJudged) {
         sentence.push_str("; the recordings do not determine it: record longer, with more motion of this joint");
     }
     Check {

@@ -12,7 +12,7 @@ pub fn junit(gated: &Gated) -> String {
         "<testsuite name=\"backdrive gate\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\">",
         gated.checks.len(),
         count(Outcome::Failed),
-        count(Outcome::Uncertain)
+        count(Outcome::Uncertain) + count(Outcome::NotJudged)
     );
     for check in &gated.checks {
         case(&mut out, check);
@@ -27,7 +27,7 @@ fn case(out: &mut String, check: &Check) {
     let _ = match check.outcome {
         Outcome::Passed => writeln!(out, "{begin}/>"),
         Outcome::Failed => writeln!(out, "{begin}><failure message=\"{text}\"/></testcase>"),
-        Outcome::Uncertain => writeln!(out, "{begin}><skipped message=\"{text}\"/></testcase>"),
+        Outcome::Uncertain | Outcome::NotJudged => writeln!(out, "{begin}><skipped message=\"{text}\"/></testcase>"),
     };
 }
 

@@ -39,8 +39,10 @@ pub enum Outcome {
     Passed,
     /// A change beyond the bound.
     Failed,
-    /// The recordings do not determine it to within the bound.
+    /// The old recordings determine it to within the bound, and the new ones do not.
     Uncertain,
+    /// The old recordings do not determine it to within the bound, so that it cannot be judged.
+    NotJudged,
 }
 
 /// One check: a quantity of a joint, old and new.
@@ -98,7 +100,8 @@ pub fn gate(old: &Path, new: &Path, model: Option<&Path>, roles: Option<&Path>, 
     checks.sort_by_key(|check| match check.outcome {
         Outcome::Failed => 0,
         Outcome::Uncertain => 1,
-        Outcome::Passed => 2,
+        Outcome::NotJudged => 2,
+        Outcome::Passed => 3,
     });
     Ok(Gated { checks, notes })
 }

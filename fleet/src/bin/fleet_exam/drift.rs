@@ -1,7 +1,6 @@
-//! Exam of the fleet: simulated units with drift in a tenth of them; how soon each is found, how many are named wrongly, and the processor time.
-//!
-//! `cargo run --release -p backdrive-fleet --bin fleet_exam -- SEED UNITS RECORDINGS`; without numbers 1, 200 and 50. `BACKDRIVE_EXAM_TABLE=FILE` keeps the table.
+//! Drift in a tenth of simulated units: how soon it is found, and what is named wrongly.
 
+use crate::processor_s;
 use backdrive_fleet::analysis::{FALSE_DISCOVERIES, analyse};
 use backdrive_fleet::date::Date;
 use backdrive_fleet::manifest::{Entry, Manifest, Source};
@@ -15,7 +14,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// A drift that is simulated.
-struct Drift {
+pub struct Drift {
     joint: usize,
     is_dry: bool,
     from: usize,
@@ -24,27 +23,31 @@ struct Drift {
     is_ramp: bool,
 }
 
-fn main() {
-    let words: Vec<u64> = std::env::args().skip(1).map(|word| word.parse().expect("SEED UNITS RECORDINGS are numbers")).collect();
-    let (seed, units, recordings) =
-        (words.first().copied().unwrap_or(1), words.get(1).copied().unwrap_or(200) as usize, words.get(2).copied().unwrap_or(50) as usize);
+/// The drifts of a seed.
+pub fn drifts(seed: u64, units: usize, recordings: usize) -> BTreeMap<usize, Drift> {
+    let drifting = (0..units / 10).map(|k| 10 * k + (seed as usize + 3 * k) % 10);
+    let of = |u: usize| {
+        let mut of_unit = random(seed, u, 0);
+        unit(&mut of_unit);
+        let is_ramp = of_unit.random_bool(0.5);
+        let share = if is_ramp { of_unit.random_range(0.02..0.04) } else { of_unit.random_range(0.15..0.4) };
+        let from = of_unit.random_range(recordings * 3 / 10..recordings * 7 / 10);
+        (u, Drift { joint: of_unit.random_range(0..JOINTS), is_dry: of_unit.random_bool(0.7), from, share, is_ramp })
+    };
+    drifting.map(of).collect()
+}
+
+/// Makes the logs of one unit after the other, answers for them, and judges the table as it was after each date.
+pub fn exam(seed: u64, units: usize, recordings: usize) {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant/robots/seven-joint-leader.toml");
     let arm = Arm::open(&model).expect("the model is there");
     let folder = tempfile::tempdir().expect("a folder for logs");
     let kept = tempfile::tempdir().expect("a folder for answers");
     let store = Store::open(kept.path()).expect("the folder is there");
-    let drifting: Vec<usize> = (0..units / 10).map(|k| 10 * k + (seed as usize + 3 * k) % 10).collect();
-    let mut drifts: BTreeMap<usize, Drift> = BTreeMap::new();
+    let drifts = drifts(seed, units, recordings);
     let (mut cpu, mut entries) = (0.0, Vec::new());
     for u in 0..units {
-        let mut of_unit = random(seed, u, 0);
-        let own = unit(&mut of_unit);
-        if drifting.contains(&u) {
-            let is_ramp = of_unit.random_bool(0.5);
-            let share = if is_ramp { of_unit.random_range(0.02..0.04) } else { of_unit.random_range(0.15..0.4) };
-            let from = of_unit.random_range(recordings * 3 / 10..recordings * 7 / 10);
-            drifts.insert(u, Drift { joint: of_unit.random_range(0..JOINTS), is_dry: of_unit.random_bool(0.7), from, share, is_ramp });
-        }
+        let own = unit(&mut random(seed, u, 0));
         let mut here = Vec::new();
         for r in 0..recordings {
             let mut of_recording = random(seed, u, r + 1);
@@ -102,7 +105,7 @@ fn main() {
 }
 
 /// Judges the table as it was after each date.
-fn judge(table: &Table, drifts: &BTreeMap<usize, Drift>, recordings: usize) {
+pub fn judge(table: &Table, drifts: &BTreeMap<usize, Drift>, recordings: usize) {
     let mut dates: Vec<Date> = table.rows.iter().filter_map(|row| row.date).collect();
     dates.sort();
     dates.dedup();
@@ -172,13 +175,4 @@ fn judge(table: &Table, drifts: &BTreeMap<usize, Drift>, recordings: usize) {
         dates.len() - 8,
         ever.len()
     );
-}
-
-/// Processor time of this process, s.
-fn processor_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = text.rsplit_once(')').map_or("", |(_, after)| after);
-    let fields: Vec<f64> = after.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    // utime and stime, in hundredths; the state before them is a letter.
-    (fields.get(10).unwrap_or(&0.0) + fields.get(11).unwrap_or(&0.0)) / 100.0
 }
