@@ -202,7 +202,7 @@ pub(super) fn loops(old: &Table, new: &Table, bounds: &Bounds) -> Vec<Check> {
         let is_open = table.rows.iter().any(|row| !row.numbers.contains_key("critical_gain"));
         (least, is_open, words)
     };
-    let ((a, _, before), (b, _, after)) = (worst(old), worst(new));
+    let ((a, a_is_open, before), (b, b_is_open, after)) = (worst(old), worst(new));
     let mut out = Vec::new();
     let bad = |words: &BTreeSet<String>| words.iter().any(|word| ["unstable", "limit_cycle", "limited"].contains(&word.as_str()));
     let list = |words: &BTreeSet<String>| words.iter().cloned().collect::<Vec<_>>().join(" and ");
@@ -215,12 +215,22 @@ pub(super) fn loops(old: &Table, new: &Table, bounds: &Bounds) -> Vec<Check> {
     let bound = bounds.of("loop", "critical_gain").map_or(0.1, |(_, bound)| bound);
     let known = a.is_finite() && b.is_finite();
     let outcome = match known {
+        // A limit that was not reached may be above the old one.
+        true if b < a * (1.0 - bound) && b_is_open => Outcome::Uncertain,
         true if b < a * (1.0 - bound) => Outcome::Failed,
         false if a.is_finite() => Outcome::Uncertain,
         _ => Outcome::Passed,
     };
-    let said = |x: f64| if x.is_finite() { short(x) } else { "not known".to_string() };
-    let percent = if known { format!(" ({:+.0} %; bound -{:.0} %)", 100.0 * (b / a - 1.0), 100.0 * bound) } else { String::new() };
+    let said = |x: f64, is_open: bool| match x.is_finite() {
+        true if is_open => format!("at least {}", short(x)),
+        true => short(x),
+        false => "not known".to_string(),
+    };
+    let percent = if known && !a_is_open && !b_is_open {
+        format!(" ({:+.0} %; bound -{:.0} %)", 100.0 * (b / a - 1.0), 100.0 * bound)
+    } else {
+        String::new()
+    };
     out.push(Check {
         kind: Kind::Stability,
         place: "loop".to_string(),
@@ -230,7 +240,7 @@ pub(super) fn loops(old: &Table, new: &Table, bounds: &Bounds) -> Vec<Check> {
         sd: None,
         bound: Some(bound * a).filter(|x| x.is_finite()),
         outcome,
-        sentence: format!("loop: stability limit mu*lambda {} -> {}{percent}", said(a), said(b)),
+        sentence: format!("loop: stability limit mu*lambda {} -> {}{percent}", said(a, a_is_open), said(b, b_is_open)),
     });
     let parts = |table: &Table| -> BTreeSet<String> {
         let texts = table.rows.iter().filter_map(|row| row.words.get("disagreeing_models"));
