@@ -9,6 +9,7 @@
 
 pub mod analysis;
 pub mod answer;
+pub mod answered;
 pub mod date;
 pub mod error;
 pub mod gate;

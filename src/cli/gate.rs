@@ -12,8 +12,8 @@ OLD and NEW are recordings, folders of recordings or manifests of a fleet: arms 
 of a loop. Of bags of a loop the stability limits are compared. A bound is a line of a TOML file, such as dry = 0.15 for 15 % of dry friction;
 [joints.elbow] has those of one joint. Every bound and its default: docs/fleet.md.
 
-Exit codes: 0 no change beyond the bounds, 1 a change beyond them, 2 usage, 3 a recording, a model or the bounds are wrong,
-5 a file cannot be written, 7 not known: the new recordings do not determine a quantity to within its bound, and the old ones do.";
+Exit codes: 0 no change beyond the bounds, 1 a change beyond them, 2 usage, 3 wrong input, 5 a file cannot be written, 7 not known. Not known is a
+quantity that the old recordings determine to within its bound and the new ones do not.";
 
 /// `backdrive gate`
 #[derive(Debug, Args)]

@@ -107,8 +107,8 @@ impl Observations {
         self.units.values().map(|unit| unit.iter().map(of).collect()).collect()
     }
 
-    /// The slope, its standard error, and a measure of what is left. Levels of units and of dates do not enter, so that a change of the whole fleet is
-    /// not laid on the weather; where units of one date do not differ in the covariate, successive recordings of a unit are compared.
+    /// The slope, its standard error, and a measure of what is left. Levels of units and of dates do not enter. So a change of the whole fleet is not
+    /// taken for an effect of the weather. Where units of one date do not differ in the covariate, successive recordings of a unit are compared.
     fn slope(&self, x: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
         let (mut xs, mut ys, mut unit_of, mut day_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut days: BTreeMap<i64, usize> = BTreeMap::new();

@@ -1,7 +1,7 @@
 //! Changes and odd units in sentences.
 
 use super::change::Shape;
-use super::{Change, Odd};
+use super::types::{Change, Odd};
 use crate::date::Date;
 use crate::parameter::Parameter;
 

@@ -1,6 +1,6 @@
 //! A diagnosis and a fit of one recording as rows.
 
-use super::{Answered, Row};
+use crate::answered::{Answered, Row};
 use crate::error::FleetError;
 use crate::manifest::{Entry, Loaded, Manifest};
 use backdrive_answers::asked::Asked;

@@ -1,6 +1,6 @@
 //! The stability of a recorded loop as a row.
 
-use super::{Answered, Row};
+use crate::answered::{Answered, Row};
 use crate::error::FleetError;
 use crate::manifest::{Entry, Manifest, Source};
 use backdrive_stability::asked::{Asked, Options};

@@ -1,7 +1,7 @@
 //! Old and new side by side: quantities of each joint, and limits of each loop.
 
 use super::bounds::{ALL, Bounds, Of};
-use super::{Check, Kind, Outcome};
+use super::types::{Check, Kind, Outcome};
 use crate::analysis::statistics::{Group, added_variance, median, weighted_mean};
 use crate::parameter::{EFFECTS, Parameter};
 use crate::table::{Table, TableRow};

@@ -1,6 +1,6 @@
 //! The checks as JUnit XML, which services of continuous integration read.
 
-use super::{Check, Gated, Outcome};
+use super::types::{Check, Gated, Outcome};
 use std::fmt::Write;
 
 /// The text of the file: a test case for each check.

@@ -1,6 +1,7 @@
 //! A manifest as a TOML file.
 
-use super::{Entry, Manifest, Source, date_in_bag, folder};
+use super::folder::{self, date_in_bag};
+use super::types::{Entry, Manifest, Source};
 use crate::date::Date;
 use crate::error::FleetError;
 use backdrive_plant::elements::Range;

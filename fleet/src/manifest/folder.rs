@@ -1,25 +1,22 @@
 //! A folder as a manifest: its folders are the units, and dates stand in the names of the files.
 
-use super::{Entry, Manifest, Source, date_in_bag, file, is_dataset, is_recording};
+use super::types::{Entry, Manifest, Source};
 use crate::date::Date;
 use crate::error::FleetError;
+use backdrive_bags::is_lerobot;
 use std::path::{Path, PathBuf};
 
 /// Folders below one another, at most: a link to a folder above would have no end.
 const DEEPEST: usize = 8;
 
-/// Opens a folder: with `fleet.toml` that file; a dataset; or a folder of recordings.
+/// Opens a dataset, or a folder of recordings.
 pub(super) fn open(folder: &Path) -> Result<Manifest, FleetError> {
-    let own = folder.join("fleet.toml");
-    if own.is_file() {
-        return file::open(&own);
-    }
     Ok(Manifest { name: folder.display().to_string(), settings: String::new(), roles: None, entries: entries(folder, "")? })
 }
 
 /// All recordings below a folder, with names that begin with `prefix`.
 pub(super) fn entries(folder: &Path, prefix: &str) -> Result<Vec<Entry>, FleetError> {
-    if is_dataset(folder) {
+    if is_lerobot(folder) {
         return episodes(folder, prefix);
     }
     let mut files = Vec::new();
@@ -78,4 +75,17 @@ fn episodes(folder: &Path, prefix: &str) -> Result<Vec<Entry>, FleetError> {
         model: None,
     };
     Ok((0..count).map(entry).collect())
+}
+
+/// Whether a file is a recording by its ending.
+fn is_recording(path: &Path) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    ["csv", "mcap", "parquet", "mat", "npz"].contains(&ending.as_str())
+}
+
+/// The first message's time of a bag, where it is one of the calendar: bags of simulations begin at 0.
+pub(super) fn date_in_bag(path: &Path) -> Option<Date> {
+    let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+    let start = if is_bag { backdrive_bags::info(path).ok()?.start_s? } else { return None };
+    (start > 946_684_800.0).then_some(Date(start as i64)) // 2000-01-01
 }

@@ -1,7 +1,9 @@
 //! The recordings of a shard answered one after the other, on some threads, and all answers together as a table.
 
-use super::{Keys, Store, Version};
-use crate::answer::{Answered, answer};
+use super::kept::Store;
+use super::key::{Keys, Version, short};
+use crate::answer::answer;
+use crate::answered::Answered;
 use crate::error::FleetError;
 use crate::manifest::{Entry, Manifest};
 use crate::table::Table;
@@ -85,7 +87,7 @@ fn answered(work: &Work, store: &Store, keys: &Keys, entry: &Entry) -> Result<(A
     let question = keys.question(entry);
     let unread = |why: String| {
         // Nothing is kept of a recording that cannot be read: it may be there the next time.
-        let key = super::key::short(&[question.as_bytes(), entry.name.as_bytes(), b"unread"]);
+        let key = short(&[question.as_bytes(), entry.name.as_bytes(), b"unread"]);
         let answered = Answered::failed(why);
         store.keep(&key, &answered)?;
         store.point(entry, &question, &key)?;

@@ -1,6 +1,6 @@
 //! The table as a parquet file that DuckDB, pandas and polars open. The same rows give the same bytes.
 
-use super::{NUMBERS, TEXTS, Table, TableRow};
+use super::rows::{NUMBERS, TEXTS, Table, TableRow};
 use crate::date::Date;
 use crate::error::FleetError;
 use crate::what::What;

@@ -13,6 +13,9 @@ use backdrive_servo::problem::{Problem as Servo, is_servo};
 use backdrive_sets::Recordings;
 use std::path::Path;
 
+/// Rows of a regression, at the least.
+pub const LEAST_ROWS: usize = 24;
+
 /// A joint of a recording, on the grid of the regression.
 pub struct JointData {
     /// Its name.
@@ -135,17 +138,13 @@ fn grid(log: &Log) -> Result<(Rates, Motion), FleetError> {
     let rates = Rates::of(&[log], None);
     let motion = Motion::of(log, &rates);
     let rows = rates.rows(&vec![0.0; motion.len()]).len();
-    match rows < regress_least() {
+    match rows < LEAST_ROWS {
         true => Err(FleetError::input(format!(
             "{}: is too short for a regression: {rows} rows below {:.1} Hz; record some seconds more",
             log.name, rates.corner
         ))),
         false => Ok((rates, motion)),
     }
-}
-
-fn regress_least() -> usize {
-    super::regress::LEAST_ROWS
 }
 
 fn joint(name: &str, is_servo: bool, log: &Log, motion: &Motion, rates: &Rates, j: usize, load: Option<Vec<f64>>) -> JointData {

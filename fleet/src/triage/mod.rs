@@ -7,7 +7,7 @@
 mod joints;
 mod regress;
 
-use crate::answer::{Answered, Row};
+use crate::answered::{Answered, Row};
 use crate::error::FleetError;
 use crate::manifest::{Entry, Loaded, Manifest, Source};
 use crate::parameter;

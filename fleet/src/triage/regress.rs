@@ -1,14 +1,12 @@
 //! The regression of one joint: least squares, with standard errors that hold for correlated residuals.
 
-use super::joints::JointData;
+use super::joints::{JointData, LEAST_ROWS};
 use crate::parameter::{ALL, EFFECTS, GAIN, LAG};
 use backdrive_diagnosis::arms::physics::direction;
 use backdrive_signal::derivative;
 use backdrive_signal::statistics::rms;
 use nalgebra::{DMatrix, DVector};
 
-/// Rows of a regression, at the least.
-pub const LEAST_ROWS: usize = 24;
 /// A column that the others explain but for this share of its size is left out: its standard error would be twenty times that of the column alone.
 const OWN_SHARE: f64 = 0.05;
 /// Stribeck speed, as a share of the joint's usual one.

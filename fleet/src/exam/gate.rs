@@ -1,6 +1,6 @@
 //! Seeded changes for the gate: half of them harmless, such as another motion, another temperature and changes below the bounds.
 
-use crate::processor_s;
+use super::processor::processor_s;
 use backdrive_fleet::gate::{Bounds, Outcome, gate};
 use backdrive_fleet::simulated::{Arm, JOINTS, RATE, Truth, normal, random, unit};
 use rand::RngExt;

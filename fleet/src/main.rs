@@ -4,17 +4,9 @@
 //! `BACKDRIVE_EXAM_TABLE=FILE` keeps the table, and `fleet_exam judge SEED UNITS RECORDINGS TABLE` judges it again. `fleet_exam gate SEED CASES`: seeded
 //! changes, half of them harmless.
 
-mod drift;
-mod gate;
+mod exam;
 
-/// Processor time of this process, s.
-fn processor_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = text.rsplit_once(')').map_or("", |(_, after)| after);
-    let fields: Vec<f64> = after.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    // utime and stime, in hundredths; the state before them is a letter.
-    (fields.get(10).unwrap_or(&0.0) + fields.get(11).unwrap_or(&0.0)) / 100.0
-}
+use exam::{drift, gate};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -1,6 +1,6 @@
 //! Drift in a tenth of simulated units: how soon it is found, and what is named wrongly.
 
-use crate::processor_s;
+use super::processor::processor_s;
 use backdrive_fleet::analysis::{FALSE_DISCOVERIES, analyse};
 use backdrive_fleet::date::Date;
 use backdrive_fleet::manifest::{Entry, Manifest, Source};
@@ -37,7 +37,7 @@ pub fn drifts(seed: u64, units: usize, recordings: usize) -> BTreeMap<usize, Dri
     drifting.map(of).collect()
 }
 
-/// Makes the logs of one unit after the other, answers for them, and judges the table as it was after each date.
+/// Makes the logs of one unit after the other, answers for them, and judges the table after each date.
 pub fn exam(seed: u64, units: usize, recordings: usize) {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant/robots/seven-joint-leader.toml");
     let arm = Arm::open(&model).expect("the model is there");
@@ -104,7 +104,7 @@ pub fn exam(seed: u64, units: usize, recordings: usize) {
     judge(&table, &drifts, recordings);
 }
 
-/// Judges the table as it was after each date.
+/// Judges the rows up to each date, one date after the other.
 pub fn judge(table: &Table, drifts: &BTreeMap<usize, Drift>, recordings: usize) {
     let mut dates: Vec<Date> = table.rows.iter().filter_map(|row| row.date).collect();
     dates.sort();
