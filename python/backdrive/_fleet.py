@@ -122,9 +122,11 @@ def _manifest(recordings: Any, out: str) -> tuple[str, int]:
     if isinstance(recordings, (str, os.PathLike)):
         path = os.path.abspath(os.fspath(recordings))
         if os.path.isdir(path):
-            return path, sum(len(files) for _, _, files in os.walk(path))
+            return path, _count(path)
         with open(path, encoding="utf-8") as file:
-            return path, max(1, file.read().count("[[recordings]]"))
+            text = file.read()
+        below = _count(os.path.dirname(path)) if "[[folders]]" in text else 0
+        return path, max(1, text.count("[[recordings]]") + below)
     if not isinstance(recordings, Sequence) or not all(isinstance(one, Mapping) and "file" in one and "unit" in one for one in recordings):
         raise UsageError("recordings: expected a path, or a list of dictionaries with file and unit", 2)
     entries = [{**one, "file": os.path.abspath(os.fspath(one["file"])), "unit": str(one["unit"])} for one in recordings]
@@ -136,3 +138,12 @@ def _manifest(recordings: Any, out: str) -> tuple[str, int]:
         for entry in entries:
             file.write("[[recordings]]\n" + _toml.document(entry) + "\n")
     return path, len(entries)
+
+
+def _count(folder: str) -> int:
+    """About how many recordings a folder has."""
+    info = os.path.join(folder, "meta", "info.json")
+    if os.path.isfile(info):
+        with open(info, encoding="utf-8") as file:
+            return int(json.load(file).get("total_episodes", 1))
+    return sum(len(files) for _, _, files in os.walk(folder))
