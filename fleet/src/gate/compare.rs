@@ -9,6 +9,8 @@ use std::collections::BTreeSet;
 
 /// Standard errors beyond which a difference is no chance: 3.7 has a probability of 0.0002, and a set of seven joints has about 70 such checks.
 const CLEAR: f64 = 3.7;
+/// By this factor the old side has to be more certain than it takes before an uncertain new side counts: another motion alone changes errors by less.
+const MARGIN: f64 = 2.0;
 /// Standard error of the logarithm of a scale, such as a residual, by recording: 30 s of motion give it to about a tenth.
 const OF_SCALE: f64 = 0.1;
 
@@ -112,7 +114,7 @@ fn judged(kind: Kind, joint: &str, quantity: &str, sides: [(f64, f64); 2], bound
     let off = new - old;
     let outcome = if off.abs() > bound && off.abs() > CLEAR * sd {
         Outcome::Failed
-    } else if CLEAR * of_old.sqrt() > bound {
+    } else if CLEAR * of_old.sqrt() > bound || CLEAR * of_new.sqrt() > bound && MARGIN * CLEAR * of_old.sqrt() > bound {
         Outcome::NotJudged
     } else if CLEAR * of_new.sqrt() > bound {
         Outcome::Uncertain
