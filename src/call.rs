@@ -5,8 +5,8 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, diagnose, doctor, export, fit, graph, init, inspect, model, prove, replay, run, secret, shell, simulate,
-    stability, test_bench, why,
+    bag, bridge, compare, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, model, prove, replay, run, secret, shell,
+    simulate, stability, test_bench, why,
 };
 use clap::Parser;
 use std::sync::Arc;
@@ -84,6 +84,8 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Init(options) => init::init(options),
         Command::Diagnose(options) => diagnose::diagnose(options),
         Command::Fit(options) => fit::fit(options),
+        Command::Fleet(options) => fleet::fleet(options),
+        Command::Gate(options) => gate::gate(options),
         Command::TestBench(options) => test_bench::test_bench(options),
         Command::Check(options) => graph::check(options),
         Command::Graph(options) => graph::draw(options),

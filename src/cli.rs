@@ -9,6 +9,8 @@ mod diagnose;
 mod doctor;
 mod export;
 mod fit;
+mod fleet;
+mod gate;
 mod graph;
 mod init;
 mod inspect;
@@ -35,6 +37,8 @@ pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use export::Export;
 pub use fit::Fit;
+pub use fleet::Fleet;
+pub use gate::Gate;
 pub use graph::Graph;
 pub use init::Init;
 pub use inspect::Inspect;
@@ -103,6 +107,12 @@ pub enum Command {
     /// Refit a model's parameters to recordings without changing its structure: standard errors, correlations, agreement between records.
     #[command(after_help = fit::HELP)]
     Fit(Fit),
+    /// Judge many recordings of many units: parameters of each, what changed on which unit since when, and units that differ.
+    #[command(after_help = fleet::HELP)]
+    Fleet(Fleet),
+    /// Compare two sets of recordings: which physics, parameter, rate or sensor changed, and whether it matters by stated bounds.
+    #[command(after_help = gate::HELP)]
+    Gate(Gate),
     /// Identify an engine test bench from its bags: inertias, shaft, maps, linear part of the dynamometer, lag of the engine.
     #[command(after_help = test_bench::HELP)]
     TestBench(TestBench),

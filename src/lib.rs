@@ -15,6 +15,8 @@ mod doctor;
 pub mod export;
 pub mod failure;
 pub mod fit;
+pub mod fleet;
+mod gate;
 mod graph;
 mod init;
 pub mod inspect;

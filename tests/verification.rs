@@ -37,6 +37,11 @@ fn agrees_with_scipy() {
 }
 
 #[test]
+fn the_analysis_of_a_fleet_agrees_with_statsmodels_and_scipy() {
+    run("fleet_check.py", &[]);
+}
+
+#[test]
 fn presliding_hysteresis_agrees_with_relays_and_scipy() {
     run("preisach_check.py", &[]);
 }

@@ -7,6 +7,7 @@
 
 pub mod compare;
 pub mod diagnose;
+pub mod fleet;
 pub mod inspect;
 pub mod offered;
 pub mod parts;

@@ -14,13 +14,14 @@ from ._backdrive import __version__
 from ._clock import ClockWarning
 from ._errors import Error, InputError, MachineError, UsageError
 from ._figures import Figure
+from ._fleet import Survey, map
 from ._model import Model
 from ._readers import Contract, load_lerobot, load_mat, load_parquet, load_rosbag, save
 from ._results import Exported, Fields, Fit, Interrupted, Prediction, Report, Verdict
 from ._verbs import compare, diagnose, export, fit, inspect, load_bag, save_bag, simulate, stability, why
 
 __all__ = [
-    "ClockWarning", "Contract", "Error", "Exported", "Fields", "Figure", "Fit", "InputError", "Interrupted", "MachineError", "Model", "Prediction", "Report", "UsageError",
-    "Verdict", "__version__", "compare", "diagnose", "export", "fit", "inspect", "load_bag", "load_lerobot", "load_mat", "load_parquet", "load_rosbag", "save", "save_bag", "simulate",
+    "ClockWarning", "Contract", "Error", "Exported", "Fields", "Figure", "Fit", "InputError", "Interrupted", "MachineError", "Model", "Prediction", "Report", "Survey", "UsageError",
+    "Verdict", "__version__", "compare", "diagnose", "export", "fit", "inspect", "load_bag", "load_lerobot", "load_mat", "load_parquet", "load_rosbag", "map", "save", "save_bag", "simulate",
     "stability", "why",
 ]

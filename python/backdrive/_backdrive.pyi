@@ -33,6 +33,17 @@ def diagnose(
     report: bool,
     progress: Progress,
 ) -> Answer: ...
+def fleet(
+    manifest: str,
+    *,
+    model: str | None,
+    what: str,
+    shard: tuple[int, int],
+    jobs: int,
+    out: str,
+    false_discoveries: float,
+    progress: Progress,
+) -> Answer: ...
 def fit(
     model: str,
     set: Recordings,

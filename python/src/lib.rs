@@ -26,6 +26,7 @@ fn _backdrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(command_line, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::diagnose_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::fit_typed, module)?)?;
+    module.add_function(wrap_pyfunction!(verbs::fleet_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::simulate_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::stability_typed, module)?)?;
     module.add_function(wrap_pyfunction!(verbs::compare_typed, module)?)?;

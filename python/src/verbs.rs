@@ -7,6 +7,7 @@ use backdrive::compare::links::Links;
 use backdrive::diagnose;
 use backdrive::failure::{Failure, code};
 use backdrive::fit::Refit;
+use backdrive::fleet::{Survey, Surveyed};
 use backdrive::inspect::inspected;
 use backdrive::model_run::Run;
 use backdrive::simulate::simulated;
@@ -308,6 +309,35 @@ pub fn inspect_typed(
         let sources: Vec<Source> = recordings.into_iter().map(source).collect();
         let found = inspected(&sources, &Reading { rate_hz: rate, columns, time })?;
         Ok(Gave { code: found.code(), json: pretty(&found.json()?)?, html: Some(found.html()), ..Gave::default() })
+    })
+}
+
+/// Answers for the recordings of a shard, and analyses the table once it is whole.
+///
+/// # Errors
+/// As those of [`diagnose_typed`].
+#[pyfunction(name = "fleet")]
+#[pyo3(signature = (manifest, *, model, what, shard, jobs, out, false_discoveries, progress))]
+#[allow(clippy::too_many_arguments)] // the keywords of the function in Python
+pub fn fleet_typed(
+    py: Python<'_>,
+    manifest: PathBuf,
+    model: Option<PathBuf>,
+    what: String,
+    shard: (usize, usize),
+    jobs: usize,
+    out: PathBuf,
+    false_discoveries: f64,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
+    answered(py, progress.as_ref(), move |caller| {
+        let what = what.parse().map_err(|why| usage(format!("what: {why}")))?;
+        if !(1..=shard.1).contains(&shard.0) {
+            return Err(usage(format!("shard is {}/{}, and the first number must be from 1 to the second", shard.0, shard.1)));
+        }
+        let asked = Survey { manifest, model, what, shard, jobs, out, false_discoveries };
+        let found = Surveyed::of(&asked, &caller.stop)?;
+        Ok(Gave { code: found.code(), json: found.json()?.to_string(), ..Gave::default() })
     })
 }
 

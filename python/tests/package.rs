@@ -29,7 +29,7 @@ fn the_package_gives_what_the_command_line_gives() {
         std::fs::copy(entry.path(), package.join(entry.file_name())).unwrap();
     }
     std::fs::copy(built.join("deps/lib_backdrive.so"), package.join("_backdrive.abi3.so")).unwrap();
-    for (script, program) in [("check.py", Some(&program)), ("readers.py", None)] {
+    for (script, program) in [("check.py", Some(&program)), ("readers.py", None), ("fleet.py", Some(&program))] {
         let mut check = Command::new(&python);
         check.arg(here.join("tests").join(script)).args(program).arg(folder.path()).env("PYTHONDONTWRITEBYTECODE", "1");
         let done = check.output().unwrap();

@@ -1,0 +1,5 @@
+//! Exams whose truth is simulated.
+
+pub mod drift;
+pub mod gate;
+mod processor;
