@@ -143,7 +143,7 @@ fn nothing_outside_the_file_is_referred_to() {
 #[test]
 fn the_library_is_in_a_page_once_and_only_with_a_figure() {
     let library = include_str!("../vendor/echarts/echarts.min.js").lines().next().unwrap();
-    assert_names(&library, &["Apache License"]);
+    assert_names(library, &["Apache License"]);
     assert_eq!(everything().html().matches(library).count(), 1);
     let mut page = Page::new("words only");
     page.text("No figure.").figure(Figure::default(), "");
