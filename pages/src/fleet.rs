@@ -6,7 +6,7 @@ use backdrive_fleet::date::Date;
 use backdrive_fleet::parameter::Parameter;
 use backdrive_fleet::table::{Table as Rows, TableRow};
 use backdrive_report::{Align, Cell, Figure, Page, Plot, Table, Tone, number};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Small multiples, at most.
 const MOST_PICTURES: usize = 12;
@@ -195,13 +195,15 @@ fn multiple(rows: &Rows, change: &Change) -> Option<Figure> {
     Some(plot.into())
 }
 
+/// Recordings of a unit: all, and those of each month.
+type Counts<'r> = (BTreeSet<&'r str>, BTreeMap<String, BTreeSet<&'r str>>);
+
 /// Units by month: recordings, and what is known of each unit.
 fn units(page: &mut Page, rows: &Rows, found: &Analysis) {
     let mut months: Vec<String> = rows.rows.iter().filter_map(|row| row.date.map(Date::month)).collect();
     months.sort();
     months.dedup();
-    let mut counts: BTreeMap<&str, (std::collections::BTreeSet<&str>, BTreeMap<String, std::collections::BTreeSet<&str>>)> =
-        BTreeMap::new();
+    let mut counts: BTreeMap<&str, Counts> = BTreeMap::new();
     for row in &rows.rows {
         let of = counts.entry(&row.unit).or_default();
         of.0.insert(&row.recording);

@@ -115,12 +115,12 @@ fn a_sealed_truth_is_not_replaced_and_bad_files_are_told() {
     let before = std::fs::read(&path).unwrap();
     let (_, second) = draw_file(folder.path(), MODEL);
     assert_eq!(second.status.code(), Some(5));
-    assert_names(&String::from_utf8(second.stderr).unwrap(), &["truth.json"]);
+    assert_names(String::from_utf8(second.stderr).unwrap(), &["truth.json"]);
     assert_eq!(std::fs::read(&path).unwrap(), before);
     let mut wrong = device_process(&path, "plant/models/impulse-engine.toml", &[]);
     let told = wrong.output().unwrap();
     assert_eq!(told.status.code(), Some(3));
-    assert_names(&String::from_utf8(told.stderr).unwrap(), &["impulse-engine-linear"]);
+    assert_names(String::from_utf8(told.stderr).unwrap(), &["impulse-engine-linear"]);
     let refused = RemoteMaster::start_process({
         wrong.stderr(Stdio::null());
         wrong

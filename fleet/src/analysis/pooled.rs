@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn many_recordings_keep_their_own_value() {
-        let unit = |level: f64, count: usize| (vec![level, level + 0.02].repeat(count), vec![1e-6; 2 * count]);
+        let unit = |level: f64, count: usize| ([level, level + 0.02].repeat(count), vec![1e-6; 2 * count]);
         let units = (0..8).map(|u| (u.to_string(), unit(f64::from(u), 200))).collect();
         let found = pooled(&units).unwrap();
         assert!(found.units["7"].shrinkage < 1e-5 && (found.units["7"].value - 7.01).abs() < 1e-4);

@@ -127,7 +127,7 @@ pub fn judge(table: &Table, drifts: &BTreeMap<usize, Drift>, recordings: usize) 
             if is_right {
                 found.entry(unit).or_insert(index);
             }
-            if !drifts.get(&unit).is_some_and(|drift| index >= drift.from) {
+            if drifts.get(&unit).is_none_or(|drift| index < drift.from) {
                 wrong.insert(&change.unit);
                 if ever.insert(change.unit.clone()) {
                     println!("wrong after {} recordings: {}, p {:.1e}, q {:.1e}", index + 1, change.sentence, change.p, change.q);

@@ -10,10 +10,13 @@ use std::path::Path;
 /// Recordings of each side.
 const RECORDINGS: usize = 2;
 
+/// Makes a change to one of the sides.
+type Apply = Box<dyn Fn(usize, &mut Truth)>;
+
 /// What changes between the two sides: the kind, its size, and the joint.
 struct Change {
     words: String,
-    apply: Box<dyn Fn(usize, &mut Truth)>,
+    apply: Apply,
     rate: f64,
 }
 
