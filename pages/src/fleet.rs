@@ -78,7 +78,7 @@ fn lead(page: &mut Page, found: &Analysis) {
     let of = format!("{} units, {} recordings", found.units, found.recordings);
     match found.changes.first() {
         Some(first) => {
-            let changed: std::collections::BTreeSet<&str> = found.changes.iter().map(|change| change.unit.as_str()).collect();
+            let changed: BTreeSet<&str> = found.changes.iter().map(|change| change.unit.as_str()).collect();
             let more = if changed.len() > 1 { format!(" {} units changed.", changed.len()) } else { String::new() };
             page.lead(Tone::Bad, &format!("{of}. The clearest change: {}.{more}", first.sentence));
         }
@@ -95,7 +95,7 @@ fn lead(page: &mut Page, found: &Analysis) {
 }
 
 fn count_of<'a>(units: impl Iterator<Item = &'a str>) -> usize {
-    units.collect::<std::collections::BTreeSet<_>>().len()
+    units.collect::<BTreeSet<_>>().len()
 }
 
 fn changes<'a>(of: impl Iterator<Item = &'a Change>, rows: &Rows) -> Table {

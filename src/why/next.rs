@@ -86,7 +86,7 @@ pub fn commands(found: &Answer, asked: &Asked, remedy: &Remedy) -> Vec<Option<Of
             (file.clone(), Some(Builder::verb("why").reads(asked.recording).option_writes("--out", &file).build()))
         }
     };
-    let replay = Builder::verb("replay").reads(asked.recording).word(&format!("--{other}")).reads_later(&file);
+    let replay = Builder::verb("replay").reads(asked.recording).word(format!("--{other}")).reads_later(&file);
     let replay = if other == "master" { replay.option("--grip", "none") } else { replay };
     write.into_iter().chain([with(replay, asked, remedy, Some(&file))]).collect()
 }
