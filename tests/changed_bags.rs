@@ -202,7 +202,7 @@ fn a_contradiction_behind_the_first_forty_thousand_steps_is_named_with_its_time(
         let (kept_back, lines) = said(&bag);
         let [line] = lines.as_slice() else { panic!("{lines:?}") };
         assert!(kept_back && line.contains(FORCE), "{line}");
-        assert_names(&line, &["2.0000 times"]);
+        assert_names(line, &["2.0000 times"]);
         let time = |word: &str| -> f64 {
             let rest = line.split(word).nth(1).unwrap_or_else(|| panic!("{line}"));
             rest.split(' ').next().and_then(|x| x.parse().ok()).unwrap_or_else(|| panic!("{line}"))

@@ -87,7 +87,7 @@ fn recordings_tell_what_leaving_something_out_costs() {
     assert!(with < 1e-3 && without > 0.02 && (without - as_exported).abs() < 1e-12, "{all}");
     assert!(all["left_out"][1]["nrmse_without"].is_null() && all["left_out"][1]["changes_the_motion"] == false, "{all}");
     assert!(all["text"].is_null(), "{all}");
-    assert_names(&all["held_out"]["of"].as_str().unwrap(), &["held-out"]);
+    assert_names(all["held_out"]["of"].as_str().unwrap(), &["held-out"]);
     assert!(std::fs::read_to_string(place.path("cart.xml")).unwrap().starts_with("<mujoco"));
     // The same for a person, with the list on standard output.
     let again = place.backdrive(&["export", "cart.toml", "--to", "mjcf", "--on", "one.csv", "two.csv", "--out", "cart.xml", "--overwrite"]);

@@ -93,7 +93,7 @@ fn a_zero_that_differs_between_files_is_found() {
     place.write("b.csv", &joint(|_, y| y + 0.3));
     let report = inspected(&place, &["a.csv", "b.csv"], 1);
     assert_eq!(kinds(&report), ["zero_shifted"]);
-    assert_names(&report["findings"][0]["todo"].as_str().unwrap(), &["offset = -0.3"]);
+    assert_names(report["findings"][0]["todo"].as_str().unwrap(), &["offset = -0.3"]);
 }
 
 #[test]

@@ -135,7 +135,7 @@ fn tables_without_a_heading_or_times_are_named_and_timed_by_options() {
     assert!((found[700].position[0] - swing(1.0, 1.4).0).abs() < 1e-9 && found[700].stamp_ns == 1_400_000_000);
     let done = init(&place, &[&of[..], &named].concat());
     is_right(&place, &done);
-    assert_names(&std::fs::read_to_string(place.path("mine/set.toml")).unwrap(), &["bags/a.mcap"]);
+    assert_names(std::fs::read_to_string(place.path("mine/set.toml")).unwrap(), &["bags/a.mcap"]);
     assert!(place.path("mine/bags/b.mcap").exists());
     let told = place.backdrive(&["fit", "mine/model.toml", "mine", "--out", "fitted.toml"]);
     assert_eq!(told.code, Some(0), "{told:?}");

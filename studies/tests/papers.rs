@@ -53,7 +53,7 @@ fn the_ball_screw_remembers_every_reversal() {
     let Some(report) = report("paper_000") else { return };
     // Four sliders do not reach the noise of a device that has seven: it may be claimed or be the nearest.
     let said = report.word_named("effects-1");
-    assert_names(&said, &["maxwell_slip at screw-ground"]);
+    assert_names(said, &["maxwell_slip at screw-ground"]);
     falls(&report, 0.3);
 }
 

@@ -131,7 +131,7 @@ fn the_robot_s_encoders_are_read_at_different_times() {
     for axis in if long() { 1..=3 } else { 1..=1 } {
         let verdict = report.word_named(&format!("axis-{axis}"));
         assert!(!verdict.contains("series_compliance"), "{axis}: {verdict}");
-        assert_names(&verdict, &["delay at"]);
+        assert_names(verdict, &["delay at"]);
         let skew = report.figure_named(&format!("axis-{axis} skew"));
         assert!((2.3..3.6).contains(&skew), "{axis}: {skew}");
         let [before, after] = ["before", "after"].map(|when| report.figure_named(&format!("axis-{axis} arm_angle {when}")));
@@ -183,7 +183,7 @@ fn the_teleoperator_s_dead_gauge_is_told_and_its_levers_rub() {
     // The audit names the gauge at its rail, and does not call the one dead that only moves little.
     let gauges = report.word_named("master gauges");
     assert!(!gauges.contains("gauge_b"), "{gauges}");
-    assert_names(&gauges, &["gauge_a"]);
+    assert_names(gauges, &["gauge_a"]);
     assert_eq!(report.word_named("slave gauges"), "nothing");
     for (gain, stiffness) in [("a", 8.0), ("b", 15.0), ("c", 25.0)] {
         let found = report.figure_named(&format!("coupling {gain}"));
