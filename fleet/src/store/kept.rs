@@ -58,7 +58,7 @@ impl Store {
         self.write(&self.answer_file(key), &Answered { verdict: Value::Null, ..answered.clone() })
     }
 
-    /// The key of a recording's answer, where it was answered. `question` is [`Keys::question`].
+    /// The key of a recording's answer, where it was answered. `question` is [`super::key::Keys::question`].
     pub fn key_of(&self, entry: &Entry, question: &str) -> Option<String> {
         let pointer: Pointer = serde_json::from_slice(&std::fs::read(self.pointer_file(entry, question)).ok()?).ok()?;
         (pointer.recording == entry.name).then_some(pointer.key)

@@ -105,7 +105,7 @@ fn columns(table: &Table) -> Vec<Column> {
     out
 }
 
-/// Reads a table that [`write`] wrote.
+/// Reads a table that [`write()`] wrote.
 ///
 /// # Errors
 /// The file cannot be read, or is no table of a fleet.
