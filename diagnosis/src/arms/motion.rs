@@ -21,6 +21,8 @@ const ABOVE: f64 = 12.0;
 const SHARE: f64 = 0.95;
 /// Least and largest corner of the regression, Hz.
 const CORNERS: [f64; 2] = [2.0, 20.0];
+/// Highest corner of the regression, in the rate of the grid.
+pub(crate) const HIGHEST: f64 = 0.1;
 /// Speed below which a joint counts as resting, as a share of its usual one.
 const RESTING: f64 = 0.04;
 /// Corner of the positions, in times the corner of the regression.
@@ -54,7 +56,7 @@ impl Rates {
                 highest = highest.max(f);
             }
         }
-        let corner = corner.unwrap_or((ABOVE * highest).clamp(CORNERS[0], CORNERS[1])).min(grid / 10.0);
+        let corner = corner.unwrap_or((ABOVE * highest).clamp(CORNERS[0], CORNERS[1])).min(HIGHEST * grid);
         let position_corner = (POSITION * corner).min(grid / 5.0);
         let thinned = ((grid / (8.0 * corner).max(100.0)).floor() as usize).max(1);
         let kept = ((grid / thinned as f64 / (4.0 * corner)).floor() as usize).max(1);
@@ -183,7 +185,7 @@ fn moving(velocity: &[f64], least: f64, smeared: usize) -> Vec<f64> {
     out
 }
 
-fn on_grid(t: &[f64], samples: &[f64], rate: f64) -> Vec<f64> {
+pub(crate) fn on_grid(t: &[f64], samples: &[f64], rate: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (t.first(), t.last()) else { return Vec::new() };
     let count = ((last - first) * rate + 1e-6).floor().max(0.0) as usize + 1;
     let grid: Vec<f64> = (0..count).map(|i| first + i as f64 / rate).collect();

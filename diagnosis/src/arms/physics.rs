@@ -213,6 +213,30 @@ pub fn direction(position: impl Iterator<Item = f64>, displacement: f64) -> Vec<
         .collect()
 }
 
+/// Dry friction with presliding along a motion, in its level: `dz = dq / displacement (1 - z sgn dq)` (Dahl 1968), exact for each step.
+pub fn dahl(position: impl Iterator<Item = f64>, displacement: f64) -> Vec<f64> {
+    let (mut state, mut before): (f64, Option<f64>) = (0.0, None);
+    position
+        .map(|q| {
+            if let Some(p) = before.filter(|p| *p != q) {
+                let end = (q - p).signum();
+                state = end + (state - end) * (-(q - p).abs() / displacement).exp();
+            }
+            before = Some(q);
+            state
+        })
+        .collect()
+}
+
+/// How many linear numbers a term has.
+pub(crate) fn columns_of(term: &Term) -> usize {
+    match term.physics {
+        Physics::Spring | Physics::Cogging | Physics::GravityDirection => 2,
+        Physics::Payload if !term.shape.is_empty() => 4,
+        _ => 1,
+    }
+}
+
 impl Sight<'_> {
     fn direction(&self, joint: usize) -> Vec<f64> {
         direction(self.motion.position[joint].iter().copied(), self.slip[joint])
@@ -238,7 +262,7 @@ impl Sight<'_> {
             Physics::Coulomb => one(self.direction(j)),
             Physics::Stribeck => one(self.direction(j).iter().zip(v).map(|(s, v)| s * (-(v / shape(0)).powi(2)).exp()).collect()),
             Physics::LoadFriction => one(self.direction(j).iter().zip(&self.load[j]).map(|(s, l)| s * l.abs()).collect()),
-            Physics::Presliding => one(direction(q.iter().copied(), shape(0))),
+            Physics::Presliding => one(dahl(q.iter().copied(), shape(0))),
             Physics::AsymmetricDamper => one(v.iter().map(|v| v.abs()).collect()),
             Physics::QuadraticDrag => one(v.iter().map(|v| v * v.abs()).collect()),
             Physics::Bias => one(vec![1.0; v.len()]),
@@ -342,11 +366,11 @@ pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
                 }
                 Physics::Stribeck => {
                     let fast = rms(motions.iter().flat_map(|m| m.velocity[j].iter().copied()));
-                    out.extend([0.03, 0.06, 0.12, 0.25, 0.5].map(|s| Term::new(physics, at, vec![s * fast.max(1e-9)])));
+                    out.extend([0.03, 0.06, 0.12, 0.25, 0.5, 0.8, 1.2].map(|s| Term::new(physics, at, vec![s * fast.max(1e-9)])));
                 }
                 Physics::Presliding => {
                     let wide = range(motions.iter().flat_map(|m| m.position[j].iter().copied()));
-                    out.extend([0.01, 0.02, 0.05, 0.1].map(|s| Term::new(physics, at, vec![s * wide.max(1e-9)])));
+                    out.extend(PRESLIDING.map(|s| Term::new(physics, at, vec![s * wide.max(1e-9)])));
                 }
                 Physics::Cogging => {
                     let wide = range(motions.iter().flat_map(|m| m.position[j].iter().copied())).max(1e-9);
@@ -373,6 +397,8 @@ pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
 
 /// Resonances of the link on its gear that are tried first, Hz.
 const RESONANCES: [f64; 8] = [2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0];
+/// Displacements of presliding that are tried first, as shares of the joint's range.
+const PRESLIDING: [f64; 8] = [0.002, 0.004, 0.007, 0.012, 0.02, 0.035, 0.06, 0.1];
 /// Gaps that are tried first, as shares of the joint's range.
 const GAPS: [f64; 7] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064];
 

@@ -3,19 +3,18 @@
 use crate::arms::consistent::consistent;
 use crate::arms::error::ArmError;
 use crate::arms::fit::{Fit, Structure, TOLERANCES, Weights};
+use crate::arms::joint_laws::acts_at;
+use crate::arms::local::{Bands, JointFound, Local, laws_of_joints};
 use crate::arms::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::arms::one_load::under_one_load;
 use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
-use crate::arms::starts::{COMMON, Start, begun, common};
 use crate::belief::predictive::{Gain, gain};
 use crate::output_error::work::Limit;
 
 /// Effects that are added at most, without those that every joint has.
 pub const MOST: usize = 8;
-/// From this number of added effects on that not every joint has, a search is made once more from another start.
-const MANY_RARE: usize = 3;
 /// Candidates that are fitted in full in each round, those that promise most.
 const FITTED: usize = 10;
 /// The same for effects that inertial parameters can compensate, where they are free.
@@ -29,6 +28,8 @@ pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that an effect has to be.
 pub const LEAST_TORQUE: f64 = 0.01;
 
+/// Effects that every joint has more or less of: they take no other's place.
+const COMMON: [Physics; 4] = [Physics::Coulomb, Physics::Damper, Physics::Bias, Physics::Inertia];
 /// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
 const LOAD_CHANGES: f64 = 0.5;
 
@@ -64,9 +65,22 @@ pub struct Search {
     /// For each added term that inertial parameters could compensate: the score, above the best one's, of the structure without it and with its bodies as free
     /// as is worth it.
     pub freed: Vec<Option<f64>>,
-    /// Joints at which one of the structures that a search ended with does not distinguish load-dependent friction from friction of one level, or whose load
-    /// hardly changes with its bodies.
+    /// Of each added term: whether it is a torque constant that these logs do not separate from other bodies.
+    pub like_bodies: Vec<bool>,
+    /// Joints at which the logs do not distinguish load-dependent friction from friction of one level, or whose load hardly changes with its bodies.
     pub under_one_load: Vec<usize>,
+    /// By joint: the laws of its own torque, and how sure each is.
+    pub locals: Vec<JointFound>,
+}
+
+impl Search {
+    /// What is known of a term that is a law of a joint's own torque, or part of one.
+    pub(crate) fn local(&self, term: &Term) -> Option<&Local> {
+        let found = self.locals.get(term.at.joint()?)?;
+        let is_named = |local: &&Local| local.terms.last().is_some_and(|own| own.is_like(term));
+        let is_part = |local: &&Local| local.terms.iter().any(|own| own.is_like(term));
+        found.chosen.iter().find(is_named).or_else(|| found.chosen.iter().find(is_part))
+    }
 }
 
 /// Another structure, with a term instead of one that was found.
@@ -89,7 +103,7 @@ pub struct Rival {
 /// # Errors
 /// Where a fit cannot be computed at all.
 pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
-    let found = beside_least_squares(data, without, most, limit)?;
+    let found = search_within(data, without, most, limit)?;
     if !(0..data.problem.joints.len()).any(|j| data.is_passive(j)) || found.best.structure.tolerance == 0 {
         return Ok(found);
     }
@@ -101,69 +115,18 @@ pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) ->
     }
     data.most_tolerance = 0;
     data.see(&data.problem.bodies.nominal)?;
-    beside_least_squares(data, without, most, limit)
+    search_within(data, without, most, limit)
 }
 
-/// Searches; where plain least squares then predicts a joint surely better, once more from there, with everything that is common from the start. The second
-/// is kept where that is so at fewer joints, and it predicts no worse over all.
-fn beside_least_squares(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
-    let found = searched_again(data, without, most, limit)?;
-    let behind = behind_least_squares(data, without, &found);
-    if behind.is_empty() || limit.is_over() {
-        return Ok(found);
-    }
-    data.see(&data.problem.bodies.nominal)?;
-    let mut again = search_within(data, without, most, limit, Start::Common)?;
-    let is_worse = compare(data, &again.best, &found.best, &found.weights).is_some_and(|g| g.is_sure());
-    if !is_worse && behind_least_squares(data, without, &again).len() < behind.len() {
-        again.under_one_load.extend(&found.under_one_load);
-        return Ok(again);
-    }
-    data.see(&data.parameters(&found.best))?;
-    Ok(found)
-}
-
-/// Joints at which plain least squares predicts held-out segments surely better than what was found. It has all inertial parameters free, and friction,
-/// armature and a constant at every joint.
-fn behind_least_squares(data: &Data, without: &[String], found: &Search) -> Vec<usize> {
-    let pool = pool(data, without);
-    let Some(plain) = data.fit(&common(data, &pool, &data.nominal_structure()), &found.weights) else { return Vec::new() };
-    let of = |fit: &Fit, joint: usize| by_block_of(data, &fit.unseen, &found.weights, false, &[joint]);
-    let is_behind = |joint: &usize| {
-        let square = |fit: &Fit| data.mean_square(&fit.unseen, *joint, false);
-        square(&plain) < (1.0 - LEAST_SHARE) * square(&found.best)
-            && gain(&of(&found.best, *joint), &of(&plain, *joint)).is_some_and(|g| g.is_sure())
-    };
-    (0..data.problem.joints.len()).filter(|joint| !data.unsigned[*joint] && !data.is_passive(*joint)).filter(is_behind).collect()
-}
-
-/// Searches; where that ends with many rare effects, once more with friction and armature at every joint from the start. Rare effects take the place of common
-/// ones that are not there when they are tried. Of the two, that with fewer rare effects is kept, unless it surely predicts held-out segments worse.
-fn searched_again(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
-    let found = search_within(data, without, most, limit, Start::AsGiven)?;
-    if rare(&found.best.structure) < MANY_RARE || limit.is_over() {
-        return Ok(found);
-    }
-    data.see(&data.problem.bodies.nominal)?;
-    let mut again = search_within(data, without, most, limit, Start::WithFriction)?;
-    let (mine, other) = (rare(&found.best.structure), rare(&again.best.structure));
-    let is_surely_better = |a: &Fit, b: &Fit| compare(data, a, b, &found.weights).is_some_and(|g| g.is_sure());
-    if is_surely_better(&found.best, &again.best) || other < mine && !is_surely_better(&again.best, &found.best) {
-        again.under_one_load.extend(&found.under_one_load);
-        return Ok(again);
-    }
-    data.see(&data.parameters(&found.best))?;
-    Ok(found)
-}
-
-fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit, from: Start) -> Result<Search, ArmError> {
+/// First by the evidence of all joints together, with what the file says of the bodies. Then, beside what several joints show, the laws of each joint's own
+/// torque are compared by left-out stretches in several bands: those hold where what no law explains is larger than the sensors' noise, and not white.
+fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool = pool(data, without);
     let nominal = data.nominal_structure();
     let mut weights = first_weights(data, &nominal).ok_or_else(failed)?;
     let mut tried = Vec::new();
-    let first = begun(data, &pool, &nominal, from);
-    let mut best = data.fit(&first, &weights).ok_or_else(failed)?;
+    let mut best = data.fit(&nominal, &weights).ok_or_else(failed)?;
     // Twice: what was found is the better view of what the joints pass on, and of how much their residuals scatter.
     for round in 0..2 {
         best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
@@ -177,7 +140,9 @@ fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit,
         }
     }
     best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
-    shrink(data, &mut best, &weights);
+    shrink(data, &mut best, &weights, &|_| false);
+    let locals = joint_by_joint(data, &pool, most, &mut best, &weights, limit)?;
+    shrink(data, &mut best, &weights, &|term| is_local(data, term) && !shows_elsewhere(term));
     // What a factor of the torque is a factor of, and what friction grows with, is what these bodies take.
     for _ in 0..2 {
         let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
@@ -191,11 +156,99 @@ fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit,
         added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
     let rivals = added.iter().map(|i| rivals(data, &pool, &best, *i, &weights)).collect();
     let freed = added.iter().map(|i| freed(data, &best, *i, &weights)).collect();
+    let is_gain = |i: &usize| best.structure.terms[*i].physics == Physics::Gain;
+    let like_bodies = added.iter().map(|i| is_gain(i) && !is_not_of_bodies(data, &best, *i, &weights)).collect();
     let mut under_one_load = under_one_load(data, &best, &weights);
     let rubs = |j: usize| best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
     under_one_load
         .extend((0..data.problem.joints.len()).filter(|j| rubs(*j) && !data.unsigned[*j] && load_spread(data, *j) < LOAD_CHANGES));
-    Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed, under_one_load })
+    Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed, like_bodies, under_one_load, locals })
+}
+
+/// Puts the laws that each joint's own torque shows in the place of those that were found there, where they predict that torque better.
+///
+/// Not on arms with a joint without a motor: bodies are then all that is known of it, and a law in another joint's torque would bend them.
+fn joint_by_joint(
+    data: &Data,
+    pool: &[Term],
+    most: usize,
+    best: &mut Fit,
+    weights: &Weights,
+    limit: Limit,
+) -> Result<Vec<JointFound>, ArmError> {
+    let joints = 0..data.problem.joints.len();
+    if joints.clone().any(|j| data.is_passive(j)) {
+        return Ok(Vec::new());
+    }
+    let of_all = best.structure.terms.iter().filter(|t| !is_local(data, t)).cloned().collect();
+    let structure = Structure { terms: of_all, ..best.structure.clone() };
+    let mut bands = Bands::of(data);
+    let nominal = data.nominal_structure();
+    bands.see(&data.seen, |band| first_weights(band, &nominal))?;
+    let looked = |tolerance: usize| {
+        let base = Structure { tolerance: tolerance.min(data.most_tolerance), ..structure.clone() };
+        laws_of_joints(data, &bands, &base, pool, limit)
+    };
+    // No law shall stand for what is wrong in a body: one that only bodies near the file's show has to be known from all joints too.
+    let (mut found, free) = (looked(structure.tolerance + 1), looked(data.most_tolerance));
+    for (joint, free) in found.iter_mut().zip(&free) {
+        let is_in = |terms: &[Term], law: &Local| law.terms.iter().all(|t| terms.iter().any(|own| own.is_like(t)));
+        let with_free: Vec<Term> = free.chosen.iter().flat_map(|law| law.terms.clone()).collect();
+        joint.chosen.retain(|law| is_in(&best.structure.terms, law) || is_in(&with_free, law));
+    }
+    for joint in joints {
+        let now: Vec<&Term> = best.structure.terms.iter().filter(|t| t.at == At::Joint(joint) && is_local(data, t)).collect();
+        let wanted: Vec<&Term> = found[joint].chosen.iter().flat_map(|law| &law.terms).collect();
+        if now.len() == wanted.len() && wanted.iter().all(|t| now.iter().any(|own| own.is_like(t))) {
+            continue;
+        }
+        match exchanged_at(data, best, joint, &found[joint], weights).filter(|other| rare(&other.structure) <= most) {
+            Some(other) => *best = other,
+            None => found[joint] = JointFound::default(),
+        }
+    }
+    *best = slipped(data, best.clone(), weights);
+    Ok(found)
+}
+
+/// The structure with these laws at a joint in the place of its own; `None` where its torque is then not predicted better, or, by fewer numbers, as well.
+fn exchanged_at(data: &Data, best: &Fit, joint: usize, found: &JointFound, weights: &Weights) -> Option<Fit> {
+    let is_own = |t: &Term| t.at == At::Joint(joint) && is_local(data, t);
+    let mut structure = best.structure.clone();
+    structure.terms.retain(|t| !is_own(t));
+    for term in found.chosen.iter().flat_map(|law| &law.terms) {
+        // A shape that was refined already stays.
+        let there = best.structure.terms.iter().find(|t| t.given.is_none() && t.is_like(term) && t.shape.len() == term.shape.len());
+        if !structure.terms.iter().any(|t| t.is_like(term)) {
+            structure.terms.push(there.unwrap_or(term).clone());
+        }
+    }
+    let mut other = tolerated(data, data.fit(&structure, weights)?, weights);
+    for index in 0..other.structure.terms.len() {
+        if is_own(&other.structure.terms[index]) {
+            other = shaped(data, other, index, weights);
+        }
+    }
+    // What is less than a hundredth of a joint's torque is in no measurement by itself.
+    let is_little = |fit: &Fit, index: usize| is_own(&fit.structure.terms[index]) && torque_share(data, fit, index) < LEAST_TORQUE;
+    while let Some(index) = (0..other.structure.terms.len()).find(|index| is_little(&other, *index)) {
+        other = data.fit(&without(&other.structure, index), weights)?;
+    }
+    let of = |fit: &Fit| by_block_of(data, &fit.unseen, weights, false, &[joint]);
+    let is_worse = gain(&of(&other), &of(best)).is_some_and(|g| g.is_sure());
+    let is_simpler = other.structure.terms.len() < best.structure.terms.len();
+    // A law of fast motion shows in few blocks: what counts is the torque that is left. Held-out logs need not show it, but not the opposite either.
+    let ratio = |held_out: bool| {
+        let left = |fit: &Fit| data.mean_square(if held_out { &fit.residual } else { &fit.unseen }, joint, held_out);
+        left(&other) / left(best).max(f64::MIN_POSITIVE)
+    };
+    let is_better = ratio(false) < 1.0 - LEAST_SHARE && ratio(true) < 1.0 + LEAST_SHARE;
+    (!is_worse && (is_simpler || is_better)).then_some(other)
+}
+
+/// Whether a term is a law of one joint's own torque, at a joint whose torque is known.
+pub(crate) fn is_local(data: &Data, term: &Term) -> bool {
+    term.given.is_none() && term.at.joint().is_some_and(|j| acts_at(term, j) && !data.is_passive(j))
 }
 
 /// Everything that a search may add.
@@ -430,6 +483,12 @@ fn is_like_bodies(physics: Physics) -> bool {
     matches!(physics, Physics::Payload | Physics::Inertia)
 }
 
+/// Whether the logs separate a wrong torque constant from other bodies: without it, released bodies predict left-out segments surely worse.
+fn is_not_of_bodies(data: &Data, best: &Fit, index: usize, weights: &Weights) -> bool {
+    let free = |structure: Structure| data.fit(&Structure { tolerance: data.most_tolerance, ..structure }, weights);
+    free(without(&best.structure, index)).and_then(|less| compare(data, &less, best, weights)).is_some_and(|g| g.is_sure())
+}
+
 /// For a term that is mass or inertia: by how much the structure without it scores above the best one where its bodies are released to compensate it. They
 /// predict the same, and only what is known of bodies speaks for the term.
 fn freed(data: &Data, best: &Fit, index: usize, weights: &Weights) -> Option<f64> {
@@ -438,11 +497,19 @@ fn freed(data: &Data, best: &Fit, index: usize, weights: &Weights) -> Option<f64
     Some(tolerated(data, less, weights).score - best.score)
 }
 
-/// Takes off again what is not worth it.
-fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
+/// Whether other joints than the one that it acts at show a law.
+fn shows_elsewhere(term: &Term) -> bool {
+    matches!(term.physics, Physics::Compliance | Physics::Backlash)
+}
+
+/// Takes off again what is not worth it, except for terms that stay.
+fn shrink(data: &Data, best: &mut Fit, weights: &Weights, stays: &dyn Fn(&Term) -> bool) {
     loop {
         let mut worst: Option<(f64, Fit)> = None;
         for index in added(&best.structure) {
+            if stays(&best.structure.terms[index]) {
+                continue;
+            }
             let Some(less) = data.fit(&without(&best.structure, index), weights) else { continue };
             let worth = less.score - best.score;
             let sure = compare(data, &less, best, weights).is_some_and(|g| g.is_sure());

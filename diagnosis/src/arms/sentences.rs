@@ -92,5 +92,7 @@ pub fn words(name: &str) -> String {
         .iter()
         .map(|p| p.facts())
         .find(|f| f.name == name)
-        .map_or_else(|| name.replace('_', " "), |f| f.words.to_string())
+        .map(|f| f.words)
+        .or_else(|| crate::physics::physics_named(name).map(|p| p.words))
+        .map_or_else(|| name.replace('_', " "), str::to_string)
 }

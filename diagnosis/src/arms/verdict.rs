@@ -6,12 +6,14 @@ use crate::arms::error::ArmError;
 use crate::arms::fit::Fit;
 use crate::arms::inertial::{COUNT, NAMES};
 use crate::arms::judge::{AGAINST, Judged};
+use crate::arms::local::Local;
 use crate::arms::physics::{At, Physics, Term};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
 use crate::arms::search::{LEAST_SHARE, Rival, Search, added, by_block};
 use crate::arms::sentences::{remaining, sentence};
 use crate::arms::written::gravity_of;
+use crate::belief::on_forces::Belief;
 use crate::belief::predictive::gain;
 use crate::hypothesis::Place;
 use crate::verdict::{
@@ -163,59 +165,86 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
         if term.physics == Physics::Coulomb && richer.iter().any(|p| there(*p)) {
             continue;
         }
-        let rivals: Vec<&Rival> = search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|r| r.above < ALIKE).collect());
-        let weights: Vec<f64> = rivals.iter().map(|r| (-0.5 * r.above.max(0.0)).exp()).collect();
-        let total = 1.0 + weights.iter().sum::<f64>();
-        let mut alternatives: Vec<Alternative> = rivals
-            .iter()
-            .zip(&weights)
-            .map(|(r, w)| Alternative {
-                physics: r.term.physics.facts().name.to_string(),
-                place: place(data, &r.term),
-                confidence: w / total,
-            })
-            .collect();
+        let local = search.local(term);
         let found = search.gains.get(order).copied().flatten();
-        let mut sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
-        if let Some(above) = search.freed.get(order).copied().flatten() {
-            // Held-out segments may not decide here: released bodies predict the same.
-            let by_bodies = 1.0 / (1.0 + (-0.5 * above).exp());
-            if by_bodies > sure {
-                sure = by_bodies.min(MASSES_SURE);
-                let physics = "inertial_parameters".to_string();
-                alternatives.push(Alternative { physics, place: place(data, term), confidence: (1.0 - sure) / total });
-            }
-        }
+        let (belief, alternatives) = match local {
+            Some(local) => (local.belief, beside(data, local)),
+            None => by_evidence(data, search, order, *index),
+        };
+        let (mut sure, mut kind) = (belief.law, belief.kind);
         let closed_loop = judged.get(order).and_then(|j| j.as_ref()).map(Judged::ratio);
-        if closed_loop.is_some_and(|ratio| ratio > AGAINST) {
-            sure = sure.min(0.5);
-        }
         let numbers = numbers(data, best, *index);
+        let against = closed_loop.is_some_and(|ratio| ratio > AGAINST);
         let is_doubted = !falls(data, search, term) || may_be_nothing(&numbers) || is_coupled_by_many(&best.structure, term);
-        if is_doubted {
-            sure = sure.min(0.5);
+        if against || is_doubted {
+            (sure, kind) = (sure.min(DOUBTED), kind.min(DOUBTED));
         }
         let facts = term.physics.facts();
-        let kin: f64 =
-            rivals.iter().zip(&weights).filter(|(r, _)| r.term.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
-        let confidence = sure / total;
         let replaces = replaced(data, term);
         let finding = Finding {
             physics: facts.name.to_string(),
             place: place(data, term),
             parameters: numbers,
             replaces,
-            confidence,
+            confidence: sure,
             family: Some(facts.family),
-            family_confidence: (confidence + sure * kin).min(1.0),
+            family_confidence: kind,
             alternatives,
             closed_loop,
         };
-        let against = closed_loop.is_some_and(|ratio| ratio > AGAINST);
         out.push((if against || is_doubted { f64::NEG_INFINITY } else { found.map_or(0.0, |g| g.mean) }, finding));
     }
     out.sort_by(|a, b| b.0.total_cmp(&a.0));
     out.into_iter().map(|(_, f)| f).collect()
+}
+
+/// How sure a finding can be at the most that held-out torque or a simulation speaks against.
+const DOUBTED: f64 = 0.45;
+
+/// What could be in the place of a law of a joint's own torque: those that are not predicted surely worse share what the law leaves.
+fn beside(data: &Data, local: &Local) -> Vec<Alternative> {
+    let left = 1.0 - local.belief.law;
+    let weights: Vec<f64> = local.rivals.iter().map(|(.., behind)| (-behind.max(0.0)).exp()).collect();
+    let total = weights.iter().sum::<f64>().max(1.0);
+    let one = |((name, term, _), weight): (&(&str, Term, f64), &f64)| Alternative {
+        physics: name.to_string(),
+        place: place(data, term),
+        confidence: left * weight / total,
+    };
+    local.rivals.iter().zip(&weights).map(one).collect()
+}
+
+/// How sure a term is that several joints show, by the evidence of all, and what could be in its place.
+fn by_evidence(data: &Data, search: &Search, order: usize, index: usize) -> (Belief, Vec<Alternative>) {
+    let term = &search.best.structure.terms[index];
+    let rivals: Vec<&Rival> = search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|r| r.above < ALIKE).collect());
+    let weights: Vec<f64> = rivals.iter().map(|r| (-0.5 * r.above.max(0.0)).exp()).collect();
+    let total = 1.0 + weights.iter().sum::<f64>();
+    let alternative = |(r, w): (&&Rival, &f64)| Alternative {
+        physics: r.term.physics.facts().name.to_string(),
+        place: place(data, &r.term),
+        confidence: w / total,
+    };
+    let mut alternatives: Vec<Alternative> = rivals.iter().zip(&weights).map(alternative).collect();
+    let mut sure = search.gains.get(order).copied().flatten().map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
+    if let Some(above) = search.freed.get(order).copied().flatten() {
+        // Held-out segments may not decide here: released bodies predict the same.
+        let by_bodies = 1.0 / (1.0 + (-0.5 * above).exp());
+        if by_bodies > sure {
+            sure = by_bodies.min(MASSES_SURE);
+            let physics = "inertial_parameters".to_string();
+            alternatives.push(Alternative { physics, place: place(data, term), confidence: (1.0 - sure) / total });
+        }
+    }
+    if search.like_bodies.get(order).is_some_and(|is| *is) {
+        sure = sure.min(DOUBTED);
+        let physics = "inertial_parameters".to_string();
+        alternatives.push(Alternative { physics, place: place(data, term), confidence: (1.0 - sure) / total });
+    }
+    let family = term.physics.facts().family;
+    let kin: f64 = rivals.iter().zip(&weights).filter(|(r, _)| r.term.physics.facts().family == family).map(|(_, w)| w / total).sum();
+    let law = sure / total;
+    (Belief { law, kind: (law + sure * kin).min(1.0) }, alternatives)
 }
 
 /// At the joints of a term what of the torque of held-out logs has to be left at most, as a share of its rms, for anything to be believed there.
@@ -242,7 +271,7 @@ fn falls(data: &Data, search: &Search, term: &Term) -> bool {
 
 /// Whether the interval of a size holds 0.
 fn may_be_nothing(numbers: &BTreeMap<String, Parameter>) -> bool {
-    const SIZES: [&str; 8] = ["force", "coulomb", "stiffness", "inertia", "coefficient", "damping", "gap", "amplitude"];
+    const SIZES: [&str; 9] = ["force", "coulomb", "stiffness", "inertia", "coefficient", "damping", "gap", "amplitude", "delay"];
     let holds_zero = |one: &Estimate| matches!(one.ci95, [Some(low), Some(high)] if low <= 0.0 && high >= 0.0);
     // One of several sizes that is nothing leaves the others.
     let sizes: Vec<&Estimate> = numbers

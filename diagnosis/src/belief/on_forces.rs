@@ -2,8 +2,7 @@
 //!
 //! A logistic regression over a few figures. Its coefficients were found on laws hidden in the noise of real machines; docs/diagnosis.md describes how.
 
-use crate::equation_error::explore::{Explored, Looked, better};
-use crate::equation_error::room::Room;
+use crate::equation_error::explore::{Explored, LawColumns, Looked, Same, better};
 use crate::tuning::tuning;
 
 /// What is known of a law that was chosen.
@@ -39,31 +38,16 @@ pub struct Belief {
     pub kind: f64,
 }
 
-/// What a law has in common with another one.
-#[derive(Clone, Copy)]
-pub(crate) enum Same {
-    Law,
-    Kind,
-}
-
 /// The nearest structure that has no such law: the one that is predicted worse by the fewest standard errors.
-pub(crate) fn nearest<'e>(rooms: &[Room], explored: &'e Explored, law: usize, same: Same) -> Option<&'e Looked> {
+pub(crate) fn nearest<'e, R: LawColumns>(rooms: &[R], explored: &'e Explored, law: usize, same: Same) -> Option<&'e Looked> {
     let (room, best) = (rooms.first()?, explored.best());
-    let own = room.named(law);
-    let is_same = |other: usize| match same {
-        Same::Law => other == law || room.laws[other].hypotheses.contains(&room.laws[law].hypotheses[0]),
-        Same::Kind => {
-            let named = room.named(other);
-            named.physics.family == own.physics.family || room.laws[other].hypotheses.contains(&room.laws[law].hypotheses[0])
-        }
-    };
     let richest = best.numbers + tuning().equation_error.rival_numbers;
-    let rivals = explored.all.iter().filter(|l| l.numbers <= richest && !l.laws.iter().any(|other| is_same(*other)));
+    let rivals = explored.all.iter().filter(|l| l.numbers <= richest && !l.laws.iter().any(|other| room.is_same(law, *other, same)));
     rivals.min_by(|a, b| better(a, best).in_errors().total_cmp(&better(b, best).in_errors()))
 }
 
 /// Figures of a law of the chosen structure: for the law, and for its kind.
-pub(crate) fn figures(rooms: &[Room], explored: &Explored, law: usize) -> [Figures; 2] {
+pub(crate) fn figures<R: LawColumns>(rooms: &[R], explored: &Explored, law: usize) -> [Figures; 2] {
     let best = explored.best();
     let rest: Vec<usize> = best.laws.iter().copied().filter(|l| *l != law).collect();
     let without = explored.all.iter().find(|l| l.laws == rest).unwrap_or(explored.nothing());
@@ -76,14 +60,14 @@ pub(crate) fn figures(rooms: &[Room], explored: &Explored, law: usize) -> [Figur
             takes: takes(with.share),
             over_rival: over.map_or(20.0, |o| o.in_errors().clamp(-20.0, 20.0)).asinh(),
             ahead: over.map_or(1.0, |o| takes(o.share)),
-            numbers: rooms.first().map_or(0.0, |room| room.laws[law].numbers as f64),
+            numbers: rooms.first().map_or(0.0, |room| room.numbers(law) as f64),
             beside: rest.len() as f64,
         }
     })
 }
 
 /// How sure a law of the chosen structure is.
-pub(crate) fn belief(rooms: &[Room], explored: &Explored, law: usize) -> Belief {
+pub(crate) fn belief<R: LawColumns>(rooms: &[R], explored: &Explored, law: usize) -> Belief {
     let [own, kind] = figures(rooms, explored, law);
     let tuning = &tuning().equation_error;
     let (sure, kind) = (logistic(&tuning.confidence, &own), logistic(&tuning.kind_confidence, &kind));

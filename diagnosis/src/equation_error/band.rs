@@ -32,13 +32,18 @@ pub(super) fn has_memory(kind: &str) -> bool {
 
 /// Corners of the bands in which the motion is resolved, Hz, the lowest first.
 pub(crate) fn corners(problem: &Problem) -> Vec<f64> {
+    let motions: Vec<(&[f64], f64)> = problem.fit.iter().filter_map(|r| Some((r.inputs.first()?.as_slice(), r.period))).collect();
+    corners_of(&motions, tuning().equation_error.highest_corner)
+}
+
+/// The same of recordings of a position, each with its sample period, s. `highest`: the highest corner, in the sample rate.
+pub(crate) fn corners_of(motions: &[(&[f64], f64)], highest: f64) -> Vec<f64> {
     let tuning = &tuning().equation_error;
-    let rate = problem.fit.iter().map(|r| 1.0 / r.period).fold(f64::INFINITY, f64::min);
-    let longest = problem.fit.iter().map(|r| r.len as f64 * r.period).fold(0.0f64, f64::max);
+    let rate = motions.iter().map(|(_, period)| 1.0 / period).fold(f64::INFINITY, f64::min);
+    let longest = motions.iter().map(|(q, period)| q.len() as f64 * period).fold(0.0f64, f64::max);
     let all = tuning.corners.iter().copied();
-    let mut held: Vec<f64> =
-        all.filter(|corner| *corner < tuning.highest_corner * rate && corner * longest > tuning.least_periods).collect();
-    while held.len() > 1 && held.last().is_some_and(|corner| noise_of_acceleration(problem, *corner) > tuning.most_noise) {
+    let mut held: Vec<f64> = all.filter(|corner| *corner < highest * rate && corner * longest > tuning.least_periods).collect();
+    while held.len() > 1 && held.last().is_some_and(|corner| noise_of_acceleration(motions, *corner) > tuning.most_noise) {
         held.pop();
     }
     // The lowest say least, and what they say is in the others too.
@@ -47,16 +52,16 @@ pub(crate) fn corners(problem: &Problem) -> Vec<f64> {
 }
 
 /// Share of the acceleration's power in a band that is sensor noise of the motion. The noise is taken for white, with the density found near half the sample rate.
-fn noise_of_acceleration(problem: &Problem, corner: f64) -> f64 {
+fn noise_of_acceleration(motions: &[(&[f64], f64)], corner: f64) -> f64 {
     let (mut noise, mut power) = (0.0, 0.0);
-    for record in &problem.fit {
-        let (Some(motion), rate) = (record.inputs.first(), 1.0 / record.period) else { continue };
+    for (motion, period) in motions {
+        let rate = 1.0 / period;
         let order = tuning().equation_error.order;
         let low = LowPass::butterworth(order, HIGHEST * rate, rate).both_ways(motion);
         let density = motion.iter().zip(&low).map(|(x, l)| (x - l) * (x - l)).sum::<f64>() / ((0.5 - HIGHEST) * rate);
         noise += density * std::f64::consts::TAU.powi(4) * corner.powi(5) / 5.0;
         let motion = LowPass::butterworth(order, corner, rate).both_ways(motion);
-        let acceleration = derivative(&derivative(&motion, record.period), record.period);
+        let acceleration = derivative(&derivative(&motion, *period), *period);
         power += acceleration.iter().map(|a| a * a).sum::<f64>();
     }
     noise / power.max(f64::MIN_POSITIVE)

@@ -1,15 +1,57 @@
 //! Every law, every pair, and of the best of those every third: what each predicts of stretches that were left out, in all bands, and which is enough.
 
 use super::gram::Left;
-use super::room::{Chosen, Room};
 use crate::tuning::tuning;
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
+
+/// A law with a choice of its nonlinear parameters: which of the laws, which of its variants.
+pub(crate) type Chosen = (usize, usize);
+
+/// What a law has in common with another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Same {
+    /// It is the same, or contains it.
+    Law,
+    /// It belongs to the same family.
+    Kind,
+}
+
+/// Laws that can be compared on the force along a motion in a band: of one body, or of a joint of an arm.
+pub(crate) trait LawColumns: Sync {
+    /// How many laws there are, the same in all bands.
+    fn count(&self) -> usize;
+    /// Numbers that a law adds.
+    fn numbers(&self, law: usize) -> usize;
+    /// Whether two laws may be looked at together.
+    fn go_together(&self, a: usize, b: usize) -> bool;
+    /// The choice of a law's nonlinear parameters with the least residual beside others; `None` where all are out of their range.
+    fn best_beside(&self, others: &[Chosen], law: usize) -> Option<Chosen>;
+    /// What laws leave of stretches that were left out.
+    fn left(&self, laws: &[Chosen]) -> Option<Left>;
+    /// The mean product of that of two structures, stretch by stretch, force squared.
+    fn mean_product(&self, a: &Left, b: &Left) -> Vec<f64>;
+    /// Whether a law is, or contains, another one, or its kind.
+    fn is_same(&self, law: usize, other: usize, same: Same) -> bool;
+    /// A law that is the same force as one of `laws` beside the rest of them, so that no motion separates the two.
+    fn same_force(&self, laws: &[usize], law: usize) -> Option<usize>;
+
+    /// The mean square of what is left, stretch by stretch, force squared.
+    fn mean_square(&self, left: &Left) -> Vec<f64> {
+        self.mean_product(left, left).into_iter().map(|x| x.max(0.0)).collect()
+    }
+
+    /// What laws leave of stretches that were left out: mean squares, force squared.
+    fn left_out(&self, laws: &[Chosen]) -> Option<Vec<f64>> {
+        self.left(laws).map(|left| self.mean_square(&left))
+    }
+}
 
 /// Laws that were looked at together, in all bands.
 #[derive(Debug, Clone)]
 pub(crate) struct Looked {
-    /// Which of [`Room::laws`].
+    /// Which laws.
     pub laws: Vec<usize>,
     /// The choices of their nonlinear parameters in each band.
     pub chosen: Vec<Vec<Chosen>>,
@@ -53,10 +95,10 @@ impl Explored {
     }
 }
 
-/// Compares all structures of at most `most` laws. `None` if the nominal parameters are not identifiable.
-pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
+/// Compares all structures of at most `most` laws. `all_laws`: laws that are looked at in the whole device. `None` if the nominal parameters are not identifiable.
+pub(crate) fn explore<R: LawColumns>(rooms: &[R], most: usize, all_laws: usize) -> Option<Explored> {
     let scales: Vec<f64> = rooms.iter().map(|room| Some(mean(&room.left_out(&[])?)).filter(|m| *m > 0.0)).collect::<Option<_>>()?;
-    let laws: Vec<usize> = (0..rooms.first()?.laws.len()).collect();
+    let laws: Vec<usize> = (0..rooms.first()?.count()).collect();
     let look = |laws: Vec<usize>, before: &[Vec<Chosen>]| {
         let chosen: Option<Vec<Vec<Chosen>>> =
             rooms.iter().enumerate().map(|(r, room)| chosen(room, before.get(r).map_or(&[], Vec::as_slice), &laws)).collect();
@@ -88,11 +130,11 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
     }
     // Where a drive rests and logs zeros there is no error at all. A residual far below that of the best structure carries no information on any structure.
     let best = all.values().min_by(|a, b| a.mean().total_cmp(&b.mean()))?.clone();
-    let floor = |((room, scale), left): ((&Room, &f64), &Left)| tuning().equation_error.floor * mean(&room.mean_square(left)) / scale;
+    let floor = |((room, scale), left): ((&R, &f64), &Left)| tuning().equation_error.floor * mean(&room.mean_square(left)) / scale;
     let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.left).map(floor).collect();
     let mut all: Vec<Looked> = all.into_values().map(|l| looked(rooms, &scales, &floors, l)).collect();
     all.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
-    let enough = enough(rooms, &all);
+    let enough = enough(rooms, &all, all_laws);
     Some(Explored { all, enough })
 }
 
@@ -104,20 +146,20 @@ fn mean(x: &[f64]) -> f64 {
 const SMALLEST: f64 = 1e-12;
 
 /// The same with its errors and number of parameters, from its residual.
-fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], mut l: Looked) -> Looked {
+fn looked<R: LawColumns>(rooms: &[R], scales: &[f64], floors: &[f64], mut l: Looked) -> Looked {
     let mut errors: Vec<f64> = Vec::new();
     for (((room, scale), floor), left) in rooms.iter().zip(scales).zip(floors).zip(&l.left) {
         let own = room.mean_square(left);
         errors.resize(own.len(), 0.0);
         errors.iter_mut().zip(own).for_each(|(sum, e)| *sum += (e / scale).max(floor.max(SMALLEST)).ln() / rooms.len() as f64);
     }
-    l.numbers = l.laws.iter().map(|law| rooms.first().map_or(0, |room| room.laws[*law].numbers)).sum();
+    l.numbers = l.laws.iter().map(|law| rooms.first().map_or(0, |room| room.numbers(*law))).sum();
     l.errors = errors.into_iter().map(f64::exp).collect();
     l
 }
 
 /// The choices of the nonlinear parameters of laws in a band, from those of some of them on.
-fn chosen(room: &Room, before: &[Chosen], laws: &[usize]) -> Option<Vec<Chosen>> {
+fn chosen<R: LawColumns>(room: &R, before: &[Chosen], laws: &[usize]) -> Option<Vec<Chosen>> {
     let mut chosen: Vec<Chosen> = before.to_vec();
     for law in laws {
         if !chosen.iter().any(|(other, _)| other == law) {
@@ -170,7 +212,7 @@ pub(crate) fn better(first: &Looked, second: &Looked) -> Better {
 ///
 /// After Clark and West (2007): the mean product of the two, each stretch in its own error. A comparison of errors alone is lost by a richer structure
 /// whose parameters are hardly known, also where it is the right one.
-fn shows(rooms: &[Room], simple: &Looked, rich: &Looked) -> f64 {
+fn shows<R: LawColumns>(rooms: &[R], simple: &Looked, rich: &Looked) -> f64 {
     let mut products: Vec<f64> = Vec::new();
     for ((room, simple), rich) in rooms.iter().zip(&simple.left).zip(&rich.left) {
         let [own, other, both] = [(simple, simple), (rich, rich), (simple, rich)].map(|(a, b)| room.mean_product(a, b));
@@ -184,15 +226,23 @@ fn shows(rooms: &[Room], simple: &Looked, rich: &Looked) -> f64 {
     products.iter().sum::<f64>() / square.sqrt().max(f64::MIN_POSITIVE)
 }
 
+/// Standard errors that one of many laws needs, so that by chance as few are found in a device of many joints as in one of a dozen laws (Bonferroni).
+fn of_many(errors: f64, all_laws: usize) -> f64 {
+    let normal = Normal::standard();
+    let times = all_laws as f64 / tuning().equation_error.dozen;
+    if times <= 1.0 { errors } else { -normal.inverse_cdf(normal.cdf(-errors) / times) }
+}
+
 /// The simplest that predicts left-out stretches alike, of those whose laws all predict better beside the others.
-fn enough(rooms: &[Room], all: &[Looked]) -> usize {
+fn enough<R: LawColumns>(rooms: &[R], all: &[Looked], all_laws: usize) -> usize {
     let tuning = &tuning().equation_error;
+    let [sure, shown] = [tuning.sure, tuning.shown].map(|errors| of_many(errors, all_laws));
     let priced = |l: &Looked| l.mean() * (1.0 + tuning.worth * l.cost());
     let Some((at, best)) = all.iter().enumerate().min_by(|a, b| priced(a.1).total_cmp(&priced(b.1))) else { return 0 };
     let is_enough = |simple: &Looked, rich: &Looked| {
         let gain = better(simple, rich);
         let numbers = rich.numbers.saturating_sub(simple.numbers) as f64;
-        let surely = gain.mean >= tuning.sure * gain.error || shows(rooms, simple, rich) >= tuning.shown;
+        let surely = gain.mean >= sure * gain.error || shows(rooms, simple, rich) >= shown;
         !surely || gain.share < tuning.least_gain.max(tuning.worth * numbers)
     };
     let is_needed = |l: &Looked, law: &usize| {

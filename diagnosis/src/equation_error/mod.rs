@@ -5,12 +5,13 @@
 
 mod band;
 pub(crate) mod explore;
-mod gram;
+pub(crate) mod gram;
 mod inverse;
 mod on_forces;
 pub(crate) mod room;
 mod search;
 
+pub(crate) use band::corners_of;
 use band::{corners, is_known};
 pub(crate) use inverse::{inverse, with_model};
 pub use on_forces::OnForces;
@@ -26,7 +27,7 @@ pub fn figures_of(problem: &Problem) -> Vec<(String, [Figures; 2])> {
         true => corners(problem).into_iter().filter_map(|corner| room::Room::of(problem, corner, &[])).collect(),
         false => Vec::new(),
     };
-    let Some(explored) = explore::explore(&rooms, crate::options::EFFECTS) else { return Vec::new() };
+    let Some(explored) = explore::explore(&rooms, crate::options::EFFECTS, 0) else { return Vec::new() };
     let one = |law: &usize| (rooms[0].named(*law).physics.name.to_string(), figures(&rooms, &explored, *law));
     explored.best().laws.iter().map(one).collect()
 }

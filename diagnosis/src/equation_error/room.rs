@@ -1,5 +1,6 @@
 //! Every law that can be examined on forces along a motion, as columns (regressors) beside those of the nominal model's own parameters.
 
+use super::explore::{Chosen, LawColumns, Same};
 use super::gram::{Gram, Left, Sum};
 use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
 use crate::output_error::simulate::predict;
@@ -31,9 +32,6 @@ struct Variant {
     spans: Vec<ForceSpan>,
     columns: Vec<usize>,
 }
-
-/// A law with a choice of its nonlinear parameters: which of [`Room::laws`], which of its variants.
-pub(crate) type Chosen = (usize, usize);
 
 /// Hypotheses, which of [`Room::hypotheses`], with their parameters.
 pub(crate) type Fitted = Vec<(usize, Vec<f64>)>;
@@ -227,31 +225,6 @@ impl Room {
         &self.hypotheses[self.laws[law].hypotheses[0]]
     }
 
-    /// Whether laws may be looked at together: at one place one dry friction, one constant, one hold.
-    pub fn go_together(&self, a: usize, b: usize) -> bool {
-        let own = |law: usize| self.laws[law].hypotheses.iter().map(|h| &self.hypotheses[*h]);
-        let alike = |x: &Hypothesis, y: &Hypothesis| {
-            let rub = |h: &Hypothesis| h.physics.family == Family::Friction;
-            let lopsided = |h: &Hypothesis| h.physics.facts.twin.is_some() || h.physics.family == Family::Bias;
-            x.id == y.id || x.place.same(&y.place) && rub(x) && rub(y) || lopsided(x) && lopsided(y) || !x.compatible(y)
-        };
-        a != b && own(a).all(|x| own(b).all(|y| !alike(x, y)))
-    }
-
-    /// A richer law at the place of one of `laws` that is the same force beside the rest of them: what it has more is a constant, and so is the free zero of a
-    /// spring. No motion separates the two.
-    pub fn same_force(&self, laws: &[usize], law: usize) -> Option<usize> {
-        let own = self.named(law);
-        let has_zero = |other: &usize| {
-            *other != law && self.laws[*other].hypotheses.iter().skip(1).any(|h| self.hypotheses[*h].physics.family == Family::Bias)
-        };
-        let is_same = |other: &usize| {
-            let other = self.named(*other);
-            other.physics.facts.twin.is_some() && contains(other.physics, own.physics) && other.place.same(&own.place)
-        };
-        if laws.iter().any(has_zero) { (0..self.laws.len()).find(is_same) } else { None }
-    }
-
     fn sum(&self, laws: &[Chosen]) -> Sum {
         let law = |(law, _): &Chosen| &self.laws[*law];
         let target = std::iter::once(0).chain(laws.iter().filter_map(|chosen| law(chosen).shift)).collect();
@@ -307,29 +280,60 @@ impl Room {
         };
         written.iter().zip(values).all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs().max(f64::MIN_POSITIVE))
     }
+}
 
-    /// What laws leave of stretches that were left out.
-    pub fn left(&self, laws: &[Chosen]) -> Option<Left> {
+impl LawColumns for Room {
+    fn count(&self) -> usize {
+        self.laws.len()
+    }
+
+    fn numbers(&self, law: usize) -> usize {
+        self.laws[law].numbers
+    }
+
+    /// At one place one dry friction, one constant, one hold.
+    fn go_together(&self, a: usize, b: usize) -> bool {
+        let own = |law: usize| self.laws[law].hypotheses.iter().map(|h| &self.hypotheses[*h]);
+        let alike = |x: &Hypothesis, y: &Hypothesis| {
+            let rub = |h: &Hypothesis| h.physics.family == Family::Friction;
+            let lopsided = |h: &Hypothesis| h.physics.facts.twin.is_some() || h.physics.family == Family::Bias;
+            x.id == y.id || x.place.same(&y.place) && rub(x) && rub(y) || lopsided(x) && lopsided(y) || !x.compatible(y)
+        };
+        a != b && own(a).all(|x| own(b).all(|y| !alike(x, y)))
+    }
+
+    /// A richer law at the place of one of `laws` that is the same force beside the rest of them: what it has more is a constant, and so is the free zero of a
+    /// spring. No motion separates the two.
+    fn same_force(&self, laws: &[usize], law: usize) -> Option<usize> {
+        let own = self.named(law);
+        let has_zero = |other: &usize| {
+            *other != law && self.laws[*other].hypotheses.iter().skip(1).any(|h| self.hypotheses[*h].physics.family == Family::Bias)
+        };
+        let is_same = |other: &usize| {
+            let other = self.named(*other);
+            other.physics.facts.twin.is_some() && contains(other.physics, own.physics) && other.place.same(&own.place)
+        };
+        if laws.iter().any(has_zero) { (0..self.laws.len()).find(is_same) } else { None }
+    }
+
+    fn left(&self, laws: &[Chosen]) -> Option<Left> {
         self.gram.left(&self.sum(laws))
     }
 
-    /// The mean product of that of two structures, stretch by stretch, force squared.
-    pub fn mean_product(&self, a: &Left, b: &Left) -> Vec<f64> {
+    fn mean_product(&self, a: &Left, b: &Left) -> Vec<f64> {
         self.gram.mean_product(a, b)
     }
 
-    /// Its mean square, stretch by stretch, force squared.
-    pub fn mean_square(&self, left: &Left) -> Vec<f64> {
-        self.gram.mean_square(left)
+    fn is_same(&self, law: usize, other: usize, same: Same) -> bool {
+        let contains = self.laws[other].hypotheses.contains(&self.laws[law].hypotheses[0]);
+        contains
+            || match same {
+                Same::Law => other == law,
+                Same::Kind => self.named(other).physics.family == self.named(law).physics.family,
+            }
     }
 
-    /// What laws leave of stretches that were left out: mean squares, force squared.
-    pub fn left_out(&self, laws: &[Chosen]) -> Option<Vec<f64>> {
-        self.left(laws).map(|left| self.mean_square(&left))
-    }
-
-    /// The choice of a law's nonlinear parameters with the least residual beside others.
-    pub fn best_beside(&self, others: &[Chosen], law: usize) -> Option<Chosen> {
+    fn best_beside(&self, others: &[Chosen], law: usize) -> Option<Chosen> {
         let one = |variant: usize| {
             let laws: Vec<Chosen> = others.iter().copied().chain([(law, variant)]).collect();
             Some(((law, variant), self.fit(&laws)?.0))

@@ -1,10 +1,10 @@
 //! A search on forces: what it found, simulated and refined as every search has it.
 
-use super::explore::{Explored, Looked, better, explore};
+use super::explore::{Chosen, Explored, LawColumns, Looked, Same, better, explore};
 use super::on_forces::OnForces;
 use super::room::Room;
 use crate::belief::compare::unseen;
-use crate::belief::on_forces::{Belief, Same, belief, nearest};
+use crate::belief::on_forces::{Belief, belief, nearest};
 use crate::belief::statistics::levels;
 use crate::hypothesis::Hypothesis;
 use crate::options::Options;
@@ -32,7 +32,7 @@ pub(crate) fn search_on_forces(
     if rooms.windows(2).any(|pair| laws(&pair[0]) != laws(&pair[1])) {
         return None;
     }
-    let mut explored = explore(&rooms, options.effects_of_one_axis())?;
+    let mut explored = explore(&rooms, options.effects_of_one_axis(), 0)?;
     report("simulating those that predict left-out stretches best");
     let band = clearest(&rooms, &explored)?;
     let room = rooms.get(band)?;
@@ -196,7 +196,7 @@ fn shortlist<'e>(rooms: &[Room], explored: &'e Explored) -> Vec<&'e Looked> {
 }
 
 /// Laws simulated along the motion, with all parameters refined.
-fn fitted(evaluator: &Evaluator, room: &Room, chosen: &[super::room::Chosen]) -> Option<Candidate> {
+fn fitted(evaluator: &Evaluator, room: &Room, chosen: &[Chosen]) -> Option<Candidate> {
     let problem = evaluator.problem;
     let (_, all) = room.fit(chosen)?;
     let (added, values): (Vec<Hypothesis>, Vec<Vec<f64>>) = all.into_iter().map(|(h, v)| (room.hypotheses[h].clone(), v)).unzip();

@@ -37,6 +37,8 @@ group! {
         sure: f64 = 1.0, "standard errors", Statistics("the richer one was already chosen as the best of many, and is penalised for its parameters");
         /// Standard errors by which the force that a richer structure has more shows in what the simpler one leaves, where the errors do not decide.
         shown: f64 = 1.645, "standard errors", Statistics("one in twenty by chance, as Clark and West have it for models that contain each other");
+        /// Laws that a device of one axis has.
+        dozen: f64 = 16.0, "laws", Statistics("`sure` and `shown` hold for so many; where more are looked at, the same chance is shared by all");
         /// What it costs that a law is one of many, in numbers.
         picked: f64 = 1.0, "numbers", Statistics("the choice among a dozen laws contains as much information as a parameter known to 10 %; two laws are less likely than one with as many parameters");
         /// Numbers that a rival may have more than the chosen structure.

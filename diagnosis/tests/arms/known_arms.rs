@@ -14,6 +14,7 @@ use backdrive_diagnosis::output_error::work::Limit;
 use backdrive_diagnosis::verdict::{Finding, Parameter, Word};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::RecordingSet;
+use rand::{RngExt, SeedableRng};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -55,13 +56,50 @@ fn dry_friction_is_named_at_its_joint() {
     assert!(model.elements.iter().any(|e| e.law.kind().name == "coulomb" && model.place_name(e.between[0]) == "elbow"));
 }
 
+/// Torque that no law explains, at both joints: noise of 0.15 s correlation, larger than the sensor's.
+fn coloured(columns: &mut [Vec<f64>; 7]) {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64((1e6 * columns[1][0].abs()) as u64);
+    for (torque, size) in [(5, 0.12), (6, 0.06)] {
+        let mut state: f64 = 0.0;
+        for sample in &mut columns[torque] {
+            state = 0.97 * state + 0.25 * size * random.random_range(-1.7..1.7);
+            *sample += state;
+        }
+    }
+}
+
 #[test]
-fn a_search_that_found_less_than_least_squares_begins_once_more_with_what_is_common() {
+fn laws_are_named_at_their_joint_in_noise_that_is_slow_and_larger_than_the_sensors() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &AS_STATED, "", |columns| {
+        coloured(columns);
+        let drag: Vec<f64> = columns[4].iter().map(|v| 0.3 * v * v.abs()).collect();
+        columns[6].iter_mut().zip(drag).for_each(|(torque, drag)| *torque += drag);
+    });
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let found = diagnose(&problem, &Options::default(), None, &|_| ()).unwrap();
+    let [finding] = found.verdict.findings.as_slice() else { panic!("{:?}", found.verdict.findings) };
+    assert_eq!((finding.physics.as_str(), &finding.place), ("quadratic_drag", &Place::Between("elbow".to_string(), "ground".to_string())));
+    assert!(finding.confidence > 0.5 && finding.family_confidence >= finding.confidence, "{finding:?}");
+    let (value, low, high) = number(finding, "coefficient");
+    assert!((value / 0.3 - 1.0).abs() < 0.25 && low < 0.3 && 0.3 < high, "{value} {low} {high}");
+}
+
+#[test]
+fn noise_that_is_slow_is_no_finding() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &AS_STATED, "", coloured);
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let found = diagnose(&problem, &Options::default(), None, &|_| ()).unwrap();
+    assert!(found.verdict.findings.iter().all(|f| f.confidence < 0.5), "{:?}", found.verdict.findings);
+}
+
+#[test]
+fn where_no_rare_effect_may_be_added_common_ones_are() {
     let folder = tempfile::tempdir().unwrap();
     set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
     let mut data = Data::new(&problem, None, false).unwrap();
-    // Nothing may be added here, so friction can only come from the second start.
     let found = search(&mut data, &[], 0, Limit::default()).unwrap();
     let at: Vec<_> = added(&found.best.structure)
         .into_iter()
