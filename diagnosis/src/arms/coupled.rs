@@ -3,7 +3,7 @@
 use crate::arms::fit::Structure;
 use crate::arms::physics::{At, Term};
 use crate::arms::problem::Problem;
-use crate::arms::search::added;
+use crate::arms::weighing::added;
 
 /// Pairs of joints of which one's motor carries torque of the other, by an effect that a search has added.
 fn coupled_pairs(structure: &Structure) -> Vec<(usize, usize)> {

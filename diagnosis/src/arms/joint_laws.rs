@@ -217,7 +217,8 @@ impl LawColumns for JointRoom {
         let rubs = |t: &Term| t.physics.facts().family == Family::Friction;
         let has_constant = |law: usize| self.terms(law).iter().any(|t| matches!(t.physics, Physics::Bias | Physics::Spring));
         let is_gear = |t: &Term| matches!(t.physics, Physics::Compliance | Physics::Backlash | Physics::Delay);
-        a != b && !x.is_like(y) && !both(&rubs) && !(has_constant(a) && has_constant(b)) && !both(&is_gear)
+        let exclude = x.is_like(y) || both(&rubs) || both(&is_gear) || has_constant(a) && has_constant(b);
+        a != b && !exclude
     }
 
     /// Of many shapes those are fitted that take most of what the others leave.

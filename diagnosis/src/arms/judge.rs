@@ -6,7 +6,8 @@
 use crate::arms::consistent::consistent;
 use crate::arms::physics::Physics;
 use crate::arms::regression::Data;
-use crate::arms::search::{Search, added};
+use crate::arms::search::Search;
+use crate::arms::weighing::added;
 use crate::arms::written::{Reading, model_of};
 use backdrive_plant::model::{Hold, Input, InputKind, Model};
 use backdrive_plant::robot::Arm;

@@ -1,4 +1,4 @@
-//! What each joint's own torque says: the laws that predict left-out stretches, joint by joint and in several bands, and how sure each is.
+//! Laws of each joint's own torque: those that predict left-out stretches, joint by joint and in several bands, and how sure each is.
 
 use crate::arms::error::ArmError;
 use crate::arms::fit::{Structure, Weights};
@@ -121,7 +121,7 @@ fn laws_of_joint(rooms: &mut Vec<JointRoom>, all: usize) -> Option<JointFound> {
     Some(JointFound { chosen: chosen.collect() })
 }
 
-/// What could be in the place of a law of the chosen structure: the nearest structure without it, and without its kind.
+/// What could replace a law of the chosen structure: the nearest structure without it, and without its kind.
 fn rivals(rooms: &[JointRoom], explored: &Explored, law: usize) -> Vec<(&'static str, Term, f64)> {
     let best = explored.best();
     let other = |rival: &Looked| rival.laws.iter().find(|l| !best.laws.contains(l)).copied();

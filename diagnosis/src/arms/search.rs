@@ -2,15 +2,18 @@
 
 use crate::arms::consistent::consistent;
 use crate::arms::error::ArmError;
-use crate::arms::fit::{Fit, Structure, TOLERANCES, Weights};
-use crate::arms::joint_laws::acts_at;
-use crate::arms::local::{Bands, JointFound, Local, laws_of_joints};
+use crate::arms::fit::{Fit, Structure, Weights};
+use crate::arms::joint_by_joint::joint_by_joint;
+use crate::arms::local::{JointFound, Local};
 use crate::arms::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::arms::one_load::under_one_load;
 use crate::arms::physics::{At, Physics, Term, candidates};
 use crate::arms::regression::Data;
 use crate::arms::remaining_residual::{Left, left};
-use crate::belief::predictive::{Gain, gain};
+use crate::arms::weighing::{
+    LEAST_SHARE, LEAST_TORQUE, LOAD_CHANGES, added, compare, first_weights, is_local, largest_share, may_be, rare,
+};
+use crate::belief::predictive::Gain;
 use crate::output_error::work::Limit;
 
 /// Effects that are added at most, without those that every joint has.
@@ -23,15 +26,6 @@ const FITTED_BESIDE: usize = 3;
 const STATED: usize = 1;
 /// By how much the information criterion has to fall for an effect to be added. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
 const WORTH: f64 = 10.0;
-/// The least share of the mean squared residual of held-out segments, at the joint where it shows most, that an effect has to explain.
-pub const LEAST_SHARE: f64 = 0.03;
-/// The least share of the rms torque of a joint, that where it shows most, that an effect has to be.
-pub const LEAST_TORQUE: f64 = 0.01;
-
-/// Effects that every joint has more or less of: they take no other's place.
-const COMMON: [Physics; 4] = [Physics::Coulomb, Physics::Damper, Physics::Bias, Physics::Inertia];
-/// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
-const LOAD_CHANGES: f64 = 0.5;
 
 /// A candidate that was fitted in full.
 #[derive(Debug, Clone)]
@@ -118,7 +112,7 @@ pub fn search(data: &mut Data, without: &[String], most: usize, limit: Limit) ->
     search_within(data, without, most, limit)
 }
 
-/// First by the evidence of all joints together, with what the file says of the bodies. Then, beside what several joints show, the laws of each joint's own
+/// First by the evidence of all joints together, with the bodies near the file's. Then, beside what several joints show, the laws of each joint's own
 /// torque are compared by left-out stretches in several bands: those hold where what no law explains is larger than the sensors' noise, and not white.
 fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
@@ -165,179 +159,10 @@ fn search_within(data: &mut Data, without: &[String], most: usize, limit: Limit)
     Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed, like_bodies, under_one_load, locals })
 }
 
-/// Puts the laws that each joint's own torque shows in the place of those that were found there, where they predict that torque better.
-///
-/// Not on arms with a joint without a motor: bodies are then all that is known of it, and a law in another joint's torque would bend them.
-fn joint_by_joint(
-    data: &Data,
-    pool: &[Term],
-    most: usize,
-    best: &mut Fit,
-    weights: &Weights,
-    limit: Limit,
-) -> Result<Vec<JointFound>, ArmError> {
-    let joints = 0..data.problem.joints.len();
-    if joints.clone().any(|j| data.is_passive(j)) {
-        return Ok(Vec::new());
-    }
-    let of_all = best.structure.terms.iter().filter(|t| !is_local(data, t)).cloned().collect();
-    let structure = Structure { terms: of_all, ..best.structure.clone() };
-    let mut bands = Bands::of(data);
-    let nominal = data.nominal_structure();
-    bands.see(&data.seen, |band| first_weights(band, &nominal))?;
-    let looked = |tolerance: usize| {
-        let base = Structure { tolerance: tolerance.min(data.most_tolerance), ..structure.clone() };
-        laws_of_joints(data, &bands, &base, pool, limit)
-    };
-    // No law shall stand for what is wrong in a body: one that only bodies near the file's show has to be known from all joints too.
-    let (mut found, free) = (looked(structure.tolerance + 1), looked(data.most_tolerance));
-    for (joint, free) in found.iter_mut().zip(&free) {
-        let is_in = |terms: &[Term], law: &Local| law.terms.iter().all(|t| terms.iter().any(|own| own.is_like(t)));
-        let with_free: Vec<Term> = free.chosen.iter().flat_map(|law| law.terms.clone()).collect();
-        joint.chosen.retain(|law| is_in(&best.structure.terms, law) || is_in(&with_free, law));
-    }
-    for joint in joints {
-        let now: Vec<&Term> = best.structure.terms.iter().filter(|t| t.at == At::Joint(joint) && is_local(data, t)).collect();
-        let wanted: Vec<&Term> = found[joint].chosen.iter().flat_map(|law| &law.terms).collect();
-        if now.len() == wanted.len() && wanted.iter().all(|t| now.iter().any(|own| own.is_like(t))) {
-            continue;
-        }
-        match exchanged_at(data, best, joint, &found[joint], weights).filter(|other| rare(&other.structure) <= most) {
-            Some(other) => *best = other,
-            None => found[joint] = JointFound::default(),
-        }
-    }
-    *best = slipped(data, best.clone(), weights);
-    Ok(found)
-}
-
-/// The structure with these laws at a joint in the place of its own; `None` where its torque is then not predicted better, or, by fewer numbers, as well.
-fn exchanged_at(data: &Data, best: &Fit, joint: usize, found: &JointFound, weights: &Weights) -> Option<Fit> {
-    let is_own = |t: &Term| t.at == At::Joint(joint) && is_local(data, t);
-    let mut structure = best.structure.clone();
-    structure.terms.retain(|t| !is_own(t));
-    for term in found.chosen.iter().flat_map(|law| &law.terms) {
-        // A shape that was refined already stays.
-        let there = best.structure.terms.iter().find(|t| t.given.is_none() && t.is_like(term) && t.shape.len() == term.shape.len());
-        if !structure.terms.iter().any(|t| t.is_like(term)) {
-            structure.terms.push(there.unwrap_or(term).clone());
-        }
-    }
-    let mut other = tolerated(data, data.fit(&structure, weights)?, weights);
-    for index in 0..other.structure.terms.len() {
-        if is_own(&other.structure.terms[index]) {
-            other = shaped(data, other, index, weights);
-        }
-    }
-    // What is less than a hundredth of a joint's torque is in no measurement by itself.
-    let is_little = |fit: &Fit, index: usize| is_own(&fit.structure.terms[index]) && torque_share(data, fit, index) < LEAST_TORQUE;
-    while let Some(index) = (0..other.structure.terms.len()).find(|index| is_little(&other, *index)) {
-        other = data.fit(&without(&other.structure, index), weights)?;
-    }
-    let of = |fit: &Fit| by_block_of(data, &fit.unseen, weights, false, &[joint]);
-    let is_worse = gain(&of(&other), &of(best)).is_some_and(|g| g.is_sure());
-    let is_simpler = other.structure.terms.len() < best.structure.terms.len();
-    // A law of fast motion shows in few blocks: what counts is the torque that is left. Held-out logs need not show it, but not the opposite either.
-    let ratio = |held_out: bool| {
-        let left = |fit: &Fit| data.mean_square(if held_out { &fit.residual } else { &fit.unseen }, joint, held_out);
-        left(&other) / left(best).max(f64::MIN_POSITIVE)
-    };
-    let is_better = ratio(false) < 1.0 - LEAST_SHARE && ratio(true) < 1.0 + LEAST_SHARE;
-    (!is_worse && (is_simpler || is_better)).then_some(other)
-}
-
-/// Whether a term is a law of one joint's own torque, at a joint whose torque is known.
-pub(crate) fn is_local(data: &Data, term: &Term) -> bool {
-    term.given.is_none() && term.at.joint().is_some_and(|j| acts_at(term, j) && !data.is_passive(j))
-}
-
 /// Everything that a search may add.
 fn pool(data: &Data, without: &[String]) -> Vec<Term> {
     let is_wanted = |t: &Term| !without.iter().any(|w| w == t.physics.facts().name) && may_be(data, t);
     candidates(data.problem, &data.motions[..data.fit_count]).into_iter().filter(is_wanted).collect()
-}
-
-/// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor or a gear that is not there. (Without a motor the
-/// load at a joint is its friction: friction in proportion to the load would be in proportion to itself.)
-fn may_be(data: &Data, term: &Term) -> bool {
-    let of_a_motor = matches!(
-        term.physics,
-        Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash | Physics::LoadFriction
-    );
-    // What grows with a load that does not change is what does not grow with it.
-    let no_load = |j: usize| term.physics == Physics::LoadFriction && load_spread(data, j) < LOAD_CHANGES;
-    let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j) || no_load(j));
-    match term.at {
-        At::Joint(j) => may(j),
-        At::Pair(j, k) => may(j) && may(k),
-        At::Base => !data.unsigned.contains(&true),
-    }
-}
-
-/// Terms that a search has added, by index.
-pub fn added(structure: &Structure) -> Vec<usize> {
-    (0..structure.terms.len()).filter(|i| structure.terms[*i].given.is_none()).collect()
-}
-
-/// Residuals of a structure that has plain friction and armature at every joint and free inertial parameters: what scatters beside them.
-fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
-    let mut rich = Structure { tolerance: TOLERANCES.len() - 1, ..nominal.clone() };
-    for joint in 0..data.problem.joints.len() {
-        for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Spring] {
-            let term = Term::new(physics, At::Joint(joint), Vec::new());
-            if may_be(data, &term) && !rich.terms.iter().any(|t| t.is_like(&term)) {
-                rich.terms.push(term);
-            }
-        }
-    }
-    let start = Weights {
-        sd: (0..data.problem.joints.len()).map(|j| (0.1 * data.scale(j, false)).max(1e-9) * data.doubt(j)).collect(),
-        time: vec![1.0; data.problem.joints.len()],
-    };
-    let mut weights = start;
-    for _ in 0..3 {
-        weights = data.weights(&data.fit(&rich, &weights)?.residual);
-    }
-    Some(weights)
-}
-
-/// Mean squared held-out residuals by block, weighted over the joints, in lists of neighbours.
-pub fn by_block(data: &Data, residual: &[f64], weights: &Weights, held_out: bool) -> Vec<Vec<f64>> {
-    let joints: Vec<usize> = (0..data.problem.joints.len()).collect();
-    by_block_of(data, residual, weights, held_out, &joints)
-}
-
-/// The same of some joints.
-fn by_block_of(data: &Data, residual: &[f64], weights: &Weights, held_out: bool, joints: &[usize]) -> Vec<Vec<f64>> {
-    let motions = if held_out { data.fit_count..data.motions.len() } else { 0..data.fit_count };
-    let of_block = |block: &crate::arms::layout::Block| -> f64 {
-        joints
-            .iter()
-            .map(|&j| {
-                let first = data.layout.of(block.motion, j).start;
-                let rows = &residual[first + block.rows.start..first + block.rows.end];
-                rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64 / weights.sd[j].powi(2)
-            })
-            .sum()
-    };
-    motions.map(|m| data.blocks.iter().filter(|b| b.motion == m).map(of_block).collect()).collect()
-}
-
-/// How much better one fit predicts stretches that it has not seen than another.
-pub fn compare(data: &Data, base: &Fit, better: &Fit, weights: &Weights) -> Option<Gain> {
-    gain(&by_block(data, &base.unseen, weights, false), &by_block(data, &better.unseen, weights, false))
-}
-
-/// The largest share of the mean squared held-out residual of a joint that one fit removes from another.
-pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
-    (0..data.problem.joints.len())
-        .map(|j| 1.0 - data.mean_square(&better.unseen, j, false) / data.mean_square(&base.unseen, j, false).max(f64::MIN_POSITIVE))
-        .fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// Terms that a search has added and that not every joint has.
-pub fn rare(structure: &Structure) -> usize {
-    added(structure).into_iter().filter(|index| !COMMON.contains(&structure.terms[*index].physics)).count()
 }
 
 /// Adds what is worth it.

@@ -38,7 +38,7 @@ group! {
         /// Standard errors by which the force that a richer structure has more shows in what the simpler one leaves, where the errors do not decide.
         shown: f64 = 1.645, "standard errors", Statistics("one in twenty by chance, as Clark and West have it for models that contain each other");
         /// Laws that a device of one axis has.
-        dozen: f64 = 16.0, "laws", Statistics("`sure` and `shown` hold for so many; where more are looked at, the same chance is shared by all");
+        dozen: f64 = 16.0, "laws", Statistics("`sure` and `shown` hold for this number; where more are compared, all share the same chance");
         /// What it costs that a law is one of many, in numbers.
         picked: f64 = 1.0, "numbers", Statistics("the choice among a dozen laws contains as much information as a parameter known to 10 %; two laws are less likely than one with as many parameters");
         /// Numbers that a rival may have more than the chosen structure.
