@@ -311,7 +311,9 @@ fn is_like_bodies(physics: Physics) -> bool {
 /// Whether the logs separate a wrong torque constant from other bodies: without it, released bodies predict left-out segments surely worse.
 fn is_not_of_bodies(data: &Data, best: &Fit, index: usize, weights: &Weights) -> bool {
     let free = |structure: Structure| data.fit(&Structure { tolerance: data.most_tolerance, ..structure }, weights);
-    free(without(&best.structure, index)).and_then(|less| compare(data, &less, best, weights)).is_some_and(|g| g.is_sure())
+    let is_worse =
+        |less: &Fit| largest_share(data, less, best) >= LEAST_SHARE && compare(data, less, best, weights).is_some_and(|g| g.is_sure());
+    free(without(&best.structure, index)).as_ref().is_some_and(is_worse)
 }
 
 /// For a term that is mass or inertia: by how much the structure without it scores above the best one where its bodies are released to compensate it. They
