@@ -7,7 +7,7 @@ use crate::belief::contenders::with_contenders;
 use crate::belief::decision::without_what_may_be_nothing;
 use crate::belief::per_record::{PerRecord, fit_each};
 use crate::belief::released_parameters::hold_with_released_parameters;
-use crate::equation_error::{OnForces, inverse, search_on_forces, with_model};
+use crate::equation_error::{OnForces, inverse, search_on_forces, turned, weighted, weighting, with_model};
 use crate::locate::{self, Location, locate};
 use crate::options::Options;
 use crate::output_error::candidate::price;
@@ -101,19 +101,39 @@ fn searched(
         Some(found) if !is_beyond(&found.1) => return Ok(found),
         direct => direct,
     };
-    let turned = inverse(&problem);
+    let turned_round = inverse(&problem);
+    let along = if problem.drifts() { turned(&problem).and_then(|turned| Some(weighted(&turned, weighting(&turned)?))) } else { None };
     let drifts = problem.drifts();
     let mut of_simulation = Vec::new();
     let simulated = by_simulation(problem, options, limit, report, &mut of_simulation)?;
     let best = chosen(&simulated.1);
     let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
     let forces_say_more = !is_explained && (drifts || best.structure.added.is_empty());
-    let on_forces = match (direct, turned) {
+    let on_forces = match (direct, turned_round) {
         (Some(found), _) => Some(found),
         (None, Some(turned)) if forces_say_more => search_on_forces(&turned, options, limit, report),
         (None, _) => None,
     };
-    match on_forces.filter(|found| !leaves_less(&simulated, found)) {
+    // What hangs on the measured body, and what a narrow band does not hold, is looked for along the motion by simulation.
+    let mut of_motion = Vec::new();
+    let along = match along.filter(|_| forces_say_more) {
+        Some(along) => {
+            report("simulating along the measured motion");
+            Some(by_simulation(along, options, limit, report, &mut of_motion)?)
+        }
+        None => None,
+    };
+    let sharper = tuning().equation_error.sharper;
+    let before = on_forces.filter(|found| left_beside(&simulated, found).is_none_or(|share| share >= sharper));
+    let wins = |found: &(Problem, Search)| {
+        let least = if before.is_some() { 1.0 / sharper } else { 1.0 };
+        explains(found) && left_beside(before.as_ref().unwrap_or(&simulated), found).is_none_or(|share| share > least)
+    };
+    if let Some(found) = along.filter(wins) {
+        remarks.extend(of_motion);
+        return Ok(found);
+    }
+    match before {
         Some(found) => Ok(found),
         None => {
             remarks.extend(of_simulation);
@@ -122,26 +142,29 @@ fn searched(
     }
 }
 
-/// Whether a search by simulation leaves far less of the measured force of held-out recordings than one on forces. Both are compared in the band of that one: beyond
-/// it a motion's steps and noise, differentiated twice, count as noise of the force and hide what either leaves.
-fn leaves_less(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
-    let (problem, found) = on_forces;
+/// Whether a search names a law at all.
+fn explains((_, search): &(Problem, Search)) -> bool {
+    !chosen(search).structure.added.is_empty()
+}
+
+/// What a model leaves of the measured force of held-out recordings, in what a search along the measured motion leaves. Both are compared in the band of that one:
+/// beyond it a motion's steps and noise, differentiated twice, count as noise of the force and hide what either leaves. `None` where either cannot be simulated.
+fn left_beside(other: &(Problem, Search), along: &(Problem, Search)) -> Option<f64> {
+    let (problem, found) = along;
     let left = |problem: &Problem, structure: &Structure, values: &[f64]| {
         let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
         Some(unseen(problem, records, structure, values, &found.noise_sd)?.mean_square.sqrt())
     };
-    let (own, best) = (chosen(found), chosen(&simulated.1));
-    let simulated = match problem.inverse {
+    let (own, best) = (chosen(found), chosen(&other.1));
+    let other = match problem.inverse {
         None => left(problem, &best.structure, &best.fit.values),
-        // A model that was fitted as driven by forces: moved along the motion, as it stands.
-        Some(_) => best.structure.model(&simulated.0, &best.fit.values).and_then(|model| {
+        // A model that was fitted on other signals: moved along the motion, as it stands.
+        Some(_) => best.structure.model(&other.0, &best.fit.values).and_then(|model| {
             let moved = with_model(problem, &model)?;
             left(&moved, &Structure::new(&moved, &moved.fit, Vec::new()), &[])
         }),
     };
-    simulated
-        .zip(left(problem, &own.structure, &own.fit.values))
-        .is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
+    Some(other? / left(problem, &own.structure, &own.fit.values)?)
 }
 
 /// What a reader has to know of a search on forces.

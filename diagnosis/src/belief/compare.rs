@@ -101,7 +101,8 @@ pub fn mean_squares(problem: &Problem, records: &[Record], structure: &Structure
     for (record, predicted) in records.iter().zip(&predicted) {
         for output in measured(record) {
             let (samples, column) = (record.compared(output)?, predicted.get(output)?.as_deref()?);
-            all.push(column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64);
+            let squares = column.iter().zip(samples).skip(record.skip).map(|(a, b)| (a - b) * (a - b));
+            all.push(squares.sum::<f64>() / record.len.saturating_sub(record.skip).max(1) as f64);
         }
     }
     Some(all)
@@ -129,7 +130,7 @@ pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted],
     for (record, predicted) in records.iter().zip(predicted) {
         for (index, output) in problem.model.outputs.iter().enumerate() {
             let (Some(samples), Some(Some(column))) = (record.compared(index), predicted.get(index)) else { continue };
-            let error: Vec<f64> = samples.iter().zip(column).map(|(y, p)| y - p).collect();
+            let error: Vec<f64> = samples.iter().zip(column).skip(record.skip).map(|(y, p)| y - p).collect();
             let lag = problem.lag.get(index).copied().unwrap_or(0);
             let lagged: Vec<f64> = match lag {
                 0 => error.clone(),

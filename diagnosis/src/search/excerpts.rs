@@ -56,7 +56,7 @@ impl Excerpts {
         let seen = structure.with_unknown(problem, records, &fit.values);
         let cut = |(r, range): (usize, &Range<usize>)| {
             let begins = match range.start {
-                0 => Vec::new(),
+                0 => records[r].begins.clone(),
                 at => motion_at(
                     &model,
                     &seen[r],
@@ -68,9 +68,12 @@ impl Excerpts {
                         budget: &evaluator.budget,
                     },
                     at,
-                )?,
+                )?
+                .into_iter()
+                .chain(records[r].along_the_motion(problem.model.bodies.len(), &problem.model, at))
+                .collect(),
             };
-            let skip = if range.start == 0 { 0 } else { (tuning().coupling.transient * range.len() as f64) as usize };
+            let skip = if range.start == 0 { records[r].skip } else { (tuning().coupling.transient * range.len() as f64) as usize };
             Some(records[r].part(range.clone(), begins, skip))
         };
         let parts = ranges.par_iter().enumerate().map(cut).collect::<Vec<_>>().into_iter().collect::<Option<Vec<Record>>>()?;

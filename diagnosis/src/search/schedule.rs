@@ -3,7 +3,7 @@
 use super::journal::Outcome;
 use super::state::State;
 use super::steps::{
-    BesideTheBest, Exchanges, Finer, FromNominal, Laws, More, MorePairs, OneParameter, OtherPlaces, Pairs, Race, Relatives,
+    BesideTheBest, Exchanges, Finer, FromNominal, Grown, Laws, More, MorePairs, OneParameter, OtherPlaces, Pairs, Race, Relatives,
     RestoredDefaults, Richer, Ripples, Scans, Singles, Split, Step,
 };
 use crate::options::Options;
@@ -75,9 +75,22 @@ pub fn table() -> Vec<StepRow> {
     rows
 }
 
+/// The steps where the motion is known and what it takes is compared: effects add up in the force, so each is looked for beside those before.
+fn steps_along_the_motion(effects: usize) -> Vec<&'static dyn Step> {
+    let mut steps: Vec<&'static dyn Step> = vec![&Ripples, &Singles::NEXT, &OneParameter, &Scans, &Relatives];
+    for _ in 1..effects {
+        steps.extend([&Grown as &dyn Step, &Relatives, &Scans]);
+    }
+    steps.extend([&Relatives as &dyn Step, &Finer, &Exchanges, &Pairs, &Laws, &Relatives, &OtherPlaces, &Relatives]);
+    steps
+}
+
 /// Takes all steps, as far as there is work to be done and something left to explain.
 pub(super) fn run(state: &mut State, options: &Options, report: &(dyn Fn(&str) + Sync)) {
-    for step in steps(state.is_quiet(), options.effects_of_one_axis()) {
+    let effects = options.effects_of_one_axis();
+    let is_turned = state.course.evaluator.problem.inverse.is_some();
+    let steps = if is_turned && !state.is_quiet() { steps_along_the_motion(effects) } else { steps(state.is_quiet(), effects) };
+    for step in steps {
         let outcome = match hindrance(step, state) {
             Some(hindrance) => hindrance,
             None => {

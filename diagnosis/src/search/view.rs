@@ -76,7 +76,7 @@ impl<'a> View<'a> {
 /// A ripple shows in a force over displacement, at whatever period, but fits only start from a few periods. Where locating finds one, a fit starts there.
 /// Returns the ripples that stand alone in the spectrum of their force, with their start values, the largest share first: gaps and friction make many
 /// lines.
-pub(super) fn ripples(records: &[Record], model: &Model, noise_sd: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
+pub(crate) fn ripples(records: &[Record], model: &Model, noise_sd: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
     let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
     let options = locate::Options { most_samples: tuning().screening.ripple_samples, laws_of_a_form: 0, ..locate::Options::quick() };
     // Where the model cannot be located in, fits start from the usual periods.

@@ -4,7 +4,7 @@ use super::error::ProblemError;
 use super::logged::Logged;
 use super::outliers::{Outliers, beside, places};
 use crate::tuning::tuning;
-use backdrive_plant::model::{Hold, Input, Model, OutputKind};
+use backdrive_plant::model::{Hold, Input, InputKind, Model, OutputKind};
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Segment, segments};
@@ -126,6 +126,18 @@ impl Record {
         self
     }
 
+    /// Bodies from `first` on, those of a hypothesis included, as the one body that a motion input prescribes moves at a sample: index, position, velocity. What
+    /// hangs on a body begins with it. Empty where no motion is prescribed, or several are.
+    pub(crate) fn along_the_motion(&self, first: usize, model: &Model, at: usize) -> Vec<(usize, f64, f64)> {
+        let motions: Vec<usize> = (0..model.inputs.len()).filter(|i| model.inputs[*i].kind == InputKind::Motion).collect();
+        let [input] = motions.as_slice() else { return Vec::new() };
+        let Some((samples, gain)) = self.inputs.get(*input).zip(model.inputs.get(*input).map(|i| i.gain)) else { return Vec::new() };
+        let (before, after) = (at.saturating_sub(1), (at + 1).min(samples.len().saturating_sub(1)));
+        let (Some(now), Some(a), Some(b)) = (samples.get(at), samples.get(before), samples.get(after)) else { return Vec::new() };
+        let speed = gain * (b - a) / (after.saturating_sub(before).max(1) as f64 * self.period);
+        (first..model.bodies.len() + ADDED).map(|body| (body, gain * now, speed)).collect()
+    }
+
     /// A part of the recording, with the motion that the bodies begin with and the samples that do not count.
     pub fn part(&self, range: std::ops::Range<usize>, begins: Vec<(usize, f64, f64)>, skip: usize) -> Record {
         let of = |samples: &Vec<f64>| samples.get(range.clone()).map(<[f64]>::to_vec).unwrap_or_default();
@@ -148,6 +160,9 @@ impl Record {
         }
     }
 }
+
+/// Bodies that hypotheses may add, at most.
+const ADDED: usize = 4;
 
 /// A recording whose outliers are put between their neighbours, and all that were found. Those of forces are left as they are: a motion cannot do that, a force
 /// may, and what drove the device is what was recorded of it.

@@ -45,7 +45,9 @@ fn relatives(course: &Course, found: &[Candidate], done: bool) -> Vec<Seed> {
             let is_simple =
                 h.physics.family == effect.physics.family && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 };
             let is_richer = !done && physics::contains(h.physics, effect.physics);
-            h.place.same(&effect.place) && h.id != effect.id && (is_simple || is_richer)
+            // A load behind a compliance and one behind a play hang on the same body, and have other names.
+            let is_here = h.place.same(&effect.place) || hypothesis::refined(effect, &values, h).is_some();
+            is_here && h.id != effect.id && (is_simple || is_richer)
         };
         for (index, h) in course.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
             let starts =
