@@ -7,13 +7,13 @@ use crate::belief::contenders::with_contenders;
 use crate::belief::decision::without_what_may_be_nothing;
 use crate::belief::per_record::{PerRecord, fit_each};
 use crate::belief::released_parameters::hold_with_released_parameters;
-use crate::equation_error::{OnForces, inverse, search_on_forces, turned, weighted, weighting, with_model};
+use crate::equation_error::{OnForces, inverse, search_on_forces, with_model};
 use crate::locate::{self, Location, locate};
 use crate::options::Options;
 use crate::output_error::candidate::price;
-use crate::output_error::hold;
 use crate::output_error::structure::Structure;
 use crate::output_error::work::{Budget, Limit};
+use crate::output_error::{hold, observed};
 use crate::recordings::problem::Problem;
 use crate::recordings::thinned::thinned;
 use crate::search::{Search, SearchError, search};
@@ -97,31 +97,32 @@ fn searched(
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
     let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
+    // Of a device that drifts a free simulation adds up all errors; beside an observer each shows where and when it acts.
+    let mut of_motion = Vec::new();
+    let along = match observed::observed(&problem) {
+        Some(along) => {
+            report("simulating beside the recorded motion");
+            Some(by_simulation(along, options, limit, report, &mut of_motion)?)
+        }
+        None => None,
+    };
+    if along.as_ref().is_some_and(|found| explains(found) && is_at_noise(found)) {
+        remarks.extend(of_motion);
+        return along.ok_or(SearchError::RunsAway);
+    }
     let direct = match search_on_forces(&problem, options, limit, report) {
         Some(found) if !is_beyond(&found.1) => return Ok(found),
         direct => direct,
     };
-    let turned_round = inverse(&problem);
-    let along = if problem.drifts() { turned(&problem).and_then(|turned| Some(weighted(&turned, weighting(&turned)?))) } else { None };
+    let turned = inverse(&problem);
     let drifts = problem.drifts();
     let mut of_simulation = Vec::new();
     let simulated = by_simulation(problem, options, limit, report, &mut of_simulation)?;
-    let best = chosen(&simulated.1);
-    let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
-    let forces_say_more = !is_explained && (drifts || best.structure.added.is_empty());
-    let on_forces = match (direct, turned_round) {
+    let forces_say_more = !is_at_noise(&simulated) && (drifts || !explains(&simulated));
+    let on_forces = match (direct, turned) {
         (Some(found), _) => Some(found),
         (None, Some(turned)) if forces_say_more => search_on_forces(&turned, options, limit, report),
         (None, _) => None,
-    };
-    // What hangs on the measured body, and what a narrow band does not hold, is looked for along the motion by simulation.
-    let mut of_motion = Vec::new();
-    let along = match along.filter(|_| forces_say_more) {
-        Some(along) => {
-            report("simulating along the measured motion");
-            Some(by_simulation(along, options, limit, report, &mut of_motion)?)
-        }
-        None => None,
     };
     let sharper = tuning().equation_error.sharper;
     let before = on_forces.filter(|found| left_beside(&simulated, found).is_none_or(|share| share >= sharper));
@@ -142,6 +143,11 @@ fn searched(
     }
 }
 
+/// Whether what a search chose leaves nothing but noise.
+fn is_at_noise((_, search): &(Problem, Search)) -> bool {
+    chosen(search).levels.iter().all(|level| *level < tuning().noise.unexplained)
+}
+
 /// Whether a search names a law at all.
 fn explains((_, search): &(Problem, Search)) -> bool {
     !chosen(search).structure.added.is_empty()
@@ -160,7 +166,7 @@ fn left_beside(other: &(Problem, Search), along: &(Problem, Search)) -> Option<f
         None => left(problem, &best.structure, &best.fit.values),
         // A model that was fitted on other signals: moved along the motion, as it stands.
         Some(_) => best.structure.model(&other.0, &best.fit.values).and_then(|model| {
-            let moved = with_model(problem, &model)?;
+            let moved = observed::with_model(problem, &model).or_else(|| with_model(problem, &model))?;
             left(&moved, &Structure::new(&moved, &moved.fit, Vec::new()), &[])
         }),
     };

@@ -69,7 +69,7 @@ fn noise_of_acceleration(motions: &[(&[f64], f64)], corner: f64) -> f64 {
 
 /// The problem in a band below a corner, Hz.
 pub(crate) fn in_band(problem: &Problem, corner: f64) -> Problem {
-    let of = |records: &[Record]| records.iter().map(|record| filtered(&problem.model, record, corner, tuning().equation_error.samples)).collect();
+    let of = |records: &[Record]| records.iter().map(|record| filtered(&problem.model, record, corner)).collect();
     Problem { fit: of(&problem.fit), held_out: of(&problem.held_out), lag: vec![0; problem.lag.len()], ..problem.clone() }
 }
 
@@ -78,11 +78,10 @@ pub(crate) fn low_pass(record: &Record, corner: f64) -> LowPass {
     LowPass::butterworth(tuning().equation_error.order, corner, 1.0 / record.period)
 }
 
-/// A record in the band below a corner, with so many samples in a period of it.
-pub(super) fn filtered(model: &Model, record: &Record, corner: f64, samples: f64) -> Record {
+fn filtered(model: &Model, record: &Record, corner: f64) -> Record {
     let (order, rate) = (tuning().equation_error.order, 1.0 / record.period);
     let low_pass = low_pass(record, corner);
-    let every = ((rate / (samples * corner)) as usize).max(1);
+    let every = ((rate / (tuning().equation_error.samples * corner)) as usize).max(1);
     let of = |samples: &Vec<f64>| low_pass.both_ways(samples).into_iter().step_by(every).collect::<Vec<f64>>();
     let period = record.period * every as f64;
     let inputs: Vec<Vec<f64>> = record.inputs.iter().map(of).collect();

@@ -13,38 +13,31 @@ use std::sync::Arc;
 /// The problem turned round; `None` unless it is one body without memory, driven by recorded forces alone, with its position recorded in every file.
 pub(crate) fn inverse(problem: &Problem) -> Option<Problem> {
     let model = &problem.model;
-    let is_one = model.bodies.len() == 1 && !model.elements.iter().any(|e| has_memory(e.law.kind().name));
-    if is_one { turned(problem) } else { None }
-}
-
-/// The same of a device with further bodies, of which nothing is recorded: what they do follows from the motion that was measured.
-pub(crate) fn turned(problem: &Problem) -> Option<Problem> {
-    let model = &problem.model;
     let is_known = |record: &Record| {
         let measured = |output: &usize| record.outputs.get(*output).is_some_and(Option::is_some);
-        let others = crate::output_error::evaluator::measured(record).count() == 1;
-        record.conditions.is_empty() && position(model, driven_by(model)).as_ref().is_some_and(measured) && (model.bodies.len() == 1 || others)
+        record.conditions.is_empty() && position(model).as_ref().is_some_and(measured)
     };
-    let driven = model.inputs.first()?.on;
     let is_plain = |i: &Input| {
-        i.kind == InputKind::Force && i.on == driven && i.delay == 0.0 && i.saturation.is_infinite() && i.bandwidth.is_infinite() && i.back_emf == 0.0
+        i.kind == InputKind::Force && i.delay == 0.0 && i.saturation.is_infinite() && i.bandwidth.is_infinite() && i.back_emf == 0.0
     };
     // A force that stands at 0 is no measurement of what the body's motion asks for: any small body fits it.
     let is_driven = |record: &Record| record.inputs.first().is_some_and(|force| force.iter().any(|f| *f != force[0]));
-    let applies = model.arm.is_none()
+    let applies = model.bodies.len() == 1
+        && model.arm.is_none()
         && problem.unknown.is_empty()
         && model.inputs.iter().all(is_plain)
+        && !model.elements.iter().any(|e| has_memory(e.law.kind().name))
         && problem.fit.iter().chain(&problem.held_out).all(is_known)
         && problem.fit.iter().any(is_driven);
     if !applies {
         return None;
     }
-    let (output, force) = (position(model, driven)?, model.inputs.first()?);
+    let (output, force) = (position(model)?, model.inputs.first()?);
     let motion = model.outputs.get(output)?;
     let turned = turned_model(model, &motion.name, &force.name);
     let of = |records: &[Record]| records.iter().map(|record| turned_record(model, output, record)).collect::<Option<Vec<Record>>>();
     let (fit, held_out) = (of(&problem.fit)?, of(&problem.held_out)?);
-    let inverse = Inverse { recorded: Arc::new(problem.clone()), output, motion: motion.name.clone(), force: force.name.clone() };
+    let inverse = Inverse { recorded: Arc::new(problem.clone()), motion: motion.name.clone(), force: force.name.clone() };
     let problem = Problem::new(problem.text.clone(), problem.model_path.clone(), turned, fit, held_out, Initial::Rest).ok()?;
     Some(Problem { inverse: Some(inverse), ..problem })
 }
@@ -52,10 +45,10 @@ pub(crate) fn turned(problem: &Problem) -> Option<Problem> {
 /// The model moved along the motion, with the force that this takes as its only output.
 fn turned_model(model: &Model, motion: &str, force: &str) -> Model {
     Model {
-        inputs: vec![Input::ideal(motion, InputKind::Motion, driven_by(model), Hold::Cubic)],
+        inputs: vec![Input::ideal(motion, InputKind::Motion, 0, Hold::Cubic)],
         outputs: vec![Output {
             name: force.to_string(),
-            kind: OutputKind::Reaction(driven_by(model)),
+            kind: OutputKind::Reaction(0),
             gain: 1.0,
             delay: 0.0,
             offset: 0.0,
@@ -73,27 +66,15 @@ pub(crate) fn with_model(turned: &Problem, model: &Model) -> Option<Problem> {
     Some(Problem { model: turned_model(model, &inverse.motion, &inverse.force), stated: Vec::new(), ..turned.clone() })
 }
 
-/// The body that the first input acts on.
-fn driven_by(model: &Model) -> usize {
-    model.inputs.first().map_or(0, |input| input.on)
-}
-
 /// The output that is the body's position, delayed by nothing.
-fn position(model: &Model, driven: usize) -> Option<usize> {
-    model.outputs.iter().position(|o| o.kind == OutputKind::Position(driven) && o.delay == 0.0 && o.gain != 0.0)
+fn position(model: &Model) -> Option<usize> {
+    model.outputs.iter().position(|o| matches!(o.kind, OutputKind::Position(0)) && o.delay == 0.0 && o.gain != 0.0)
 }
 
 fn turned_record(model: &Model, output: usize, record: &Record) -> Option<Record> {
     let sensor = model.outputs.get(output)?;
     let motion: Vec<f64> = record.outputs.get(output)?.as_ref()?.iter().map(|y| (y - sensor.offset) / sensor.gain).collect();
-    let mut force = vec![0.0; record.len];
-    for (input, samples) in model.inputs.iter().zip(&record.inputs) {
-        // What is held from sample to sample acts half a sample later on average: around a sample, half the one before.
-        let before = |i: usize| if input.hold == Hold::Zero { samples.get(i.saturating_sub(1)) } else { samples.get(i) };
-        for (i, (sum, now)) in force.iter_mut().zip(samples).enumerate() {
-            *sum += input.gain * 0.5 * (now + before(i)?);
-        }
-    }
+    let force = record.total_force(model)?;
     let (inputs, outputs) = (vec![motion], vec![Some(force)]);
     let segments = inputs.iter().map(|samples| segments(Hold::Cubic, samples, record.period)).collect();
     let spread = outputs.iter().flatten().map(|samples| spread(samples)).collect();

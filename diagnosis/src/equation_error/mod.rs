@@ -10,14 +10,12 @@ mod inverse;
 mod on_forces;
 pub(crate) mod room;
 mod search;
-mod weighted;
 
 pub(crate) use band::corners_of;
 use band::{corners, is_known};
-pub(crate) use inverse::{inverse, turned, with_model};
+pub(crate) use inverse::{inverse, with_model};
 pub use on_forces::OnForces;
 pub(crate) use search::search_on_forces;
-pub(crate) use weighted::{weighted, weighting};
 
 use crate::belief::on_forces::{Figures, figures};
 use crate::recordings::problem::Problem;

@@ -9,6 +9,7 @@ pub mod evaluator;
 pub mod fit;
 pub mod hold;
 pub(crate) mod normal_equations;
+pub(crate) mod observed;
 pub mod simulate;
 pub mod structure;
 pub mod work;

@@ -2,6 +2,7 @@
 
 use crate::hypothesis::Hypothesis;
 use crate::output_error::coupling::Coupling;
+use crate::output_error::observed;
 use crate::output_error::simulate::{Conditions, Curve, Start, derivatives_under, predict_under};
 use crate::output_error::work::Budget;
 use crate::recordings::problem::{Problem, Record, Stated};
@@ -266,7 +267,7 @@ impl Structure {
         for (hypothesis, values) in self.added.iter().zip(self.added_of(values)) {
             model = hypothesis.apply(&model, &values).ok()?;
         }
-        Some(model)
+        Some(observed::rescaled(model, &problem.model))
     }
 
     /// Predictions of one of the records that the structure was made for, where it stands among them; see [`crate::output_error::simulate::predict`].

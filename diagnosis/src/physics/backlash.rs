@@ -67,8 +67,7 @@ fn behind(sites: &Sites, site: &Site) -> Option<Hypothesis> {
     let (Some(body), true) = (site.ends[0], site.reach == Reach::Ground) else { return None };
     let model = sites.model;
     let joined = model.elements.iter().any(|e| e.between.contains(&Some(body)) && e.between.iter().flatten().count() == 2);
-    // Of a motor whose torque is compared along its own motion the load is as free as ever; a body on a spindle has what its rig has.
-    let moved = !sites.scales.reads_drive && model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
+    let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
     let own = model.bodies[body].inertia;
     if joined || moved || own <= 0.0 {
         return None;

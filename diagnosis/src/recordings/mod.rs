@@ -3,6 +3,7 @@
 pub mod follow;
 pub mod kinematics;
 pub mod noise;
+pub(crate) mod observer;
 pub mod problem;
 pub mod repeatability;
 pub mod signal;

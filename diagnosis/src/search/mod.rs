@@ -24,6 +24,7 @@ use crate::output_error::evaluator::Evaluator;
 use crate::output_error::hold::evidence;
 use crate::output_error::work::{Budget, Limit};
 use crate::physics;
+use crate::recordings::observer::without_observer;
 use crate::recordings::problem::Problem;
 use crate::search::excerpts::Excerpts;
 use crate::search::race::Course;
@@ -119,7 +120,7 @@ pub fn search(problem: &Problem, options: &Options, limit: Limit, report: &(dyn 
 fn hypotheses_for(nominal: &Nominal, options: &Options) -> Vec<Hypothesis> {
     let problem = nominal.evaluator.problem;
     let withheld: Vec<&str> = options.without.iter().map(String::as_str).collect();
-    let mut hypotheses = physics::without(physics::all(&nominal.model, &nominal.scales), &withheld);
+    let mut hypotheses = physics::without(physics::all(&without_observer(&nominal.model), &nominal.scales), &withheld);
     let mut classes = HashSet::new();
     hypotheses.retain(|h| {
         let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));

@@ -139,7 +139,8 @@ impl<'a> Nominal<'a> {
         let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
         let firm = Coupling::new(problem, &problem.fit, &scales, &evaluator.noise_sd, strength);
         let far = level > tuning().noise.far;
-        let pulled = far && !firm.is_empty();
+        // An observer couples it by itself.
+        let pulled = far && !firm.is_empty() && problem.inverse.is_none();
         // A prescribed motion couples the device by itself.
         let coupled_first = pulled || far && problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
         let coupler = Coupler { evaluator: &evaluator, middle: &middle, structure: &structure, firm: &firm, far, pulled, coupled_first };
@@ -211,9 +212,7 @@ fn scales(problem: &Problem, model: &Model, seen: &[Record]) -> Result<Scales, S
         samples.fold(0.0_f64, |most, y| most.max(y.abs()))
     };
     let measured: Vec<f64> = (0..model.outputs.len()).map(largest).collect();
-    let mut scales = Scales::of(model, &runs)?.with_measured(model, &measured);
-    scales.reads_drive = problem.inverse.is_some();
-    Ok(scales)
+    Ok(Scales::of(model, &runs)?.with_measured(model, &measured))
 }
 
 /// A fit on the recordings that are explained worst first, where there are many samples, then on all; so many steps on either. `there` are
@@ -261,10 +260,6 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
             let parts: Vec<&[f64]> = layout.iter().filter(|l| l.1 == output).filter_map(|l| residuals.get(l.2.clone())).collect();
             let signals: Vec<&[f64]> = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).collect();
             let own = evaluator.noise_sd[output];
-            // What a low-pass leaves is smooth, and its differences say nothing of the noise.
-            if problem.fit.iter().any(|r| r.low_pass.is_some()) {
-                return own;
-            }
             let least = noise::stated(&problem.model, output, &signals);
             let spread = problem.fit.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
             if parts.is_empty() {

@@ -15,8 +15,6 @@ group! {
         bands: usize = 3, "bands", Judgement("an answer that hangs on the corner differs between them");
         /// Periods of the corner in the longest recording, at least.
         least_periods: f64 = 20.0, "periods", Statistics("stretches of fewer than two periods say nothing by themselves");
-        /// Noise of a force, at least, in its root mean square.
-        least_noise_of_force: f64 = 1e-3, "-", Judgement("a current loop, a torque constant or an amplifier is no better over a whole recording");
         /// Order of the low-pass, which is run both ways.
         order: usize = 4, "-", Judgement("as steep as identification of robots has it (Gautier); steeper ones ring");
         /// Samples in a period of the corner that are simulated.

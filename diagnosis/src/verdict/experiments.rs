@@ -8,6 +8,7 @@ use crate::belief::decision::Decision;
 use crate::belief::intervals::NORMAL_975;
 use crate::experiment::{Experiment, NewSensor, Reason, confirm, excite, separate};
 use crate::output_error::candidate::Candidate;
+use crate::output_error::observed::recorded;
 use crate::output_error::work::Budget;
 use crate::recordings::problem::Problem;
 use crate::search::Search;
@@ -23,7 +24,8 @@ pub(super) fn next_experiment<'a, 's>(
     decision: &mut Decision<'s>,
     budget: &Budget<'a>,
 ) -> (Option<NextExperiment>, Option<String>) {
-    match planned(problem, search, decision, budget) {
+    // An experiment is played on the device, beside which there is no observer.
+    match planned(recorded(problem), search, decision, budget) {
         Ok(plan) => (Some(NextExperiment::Planned(in_file(&plan))), Some(plan.text)),
         Err(reason) => (Some(NextExperiment::Refused(Refused { sentence: reason.to_string() })), None),
     }

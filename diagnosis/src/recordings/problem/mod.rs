@@ -212,9 +212,7 @@ impl Problem {
 pub struct Inverse {
     /// The problem before it was inverted.
     pub recorded: Arc<Problem>,
-    /// Which of its outputs is now the motion.
-    pub output: usize,
-    /// That output's name.
+    /// The output that is now the motion.
     pub motion: String,
     /// The input that is now compared; the first where several forces act on the body.
     pub force: String,

@@ -126,6 +126,19 @@ impl Record {
         self
     }
 
+    /// The sum of the forces that inputs make, at its samples, N or N m; `None` where an input has too few.
+    pub(crate) fn total_force(&self, model: &Model) -> Option<Vec<f64>> {
+        let mut force = vec![0.0; self.len];
+        for (input, samples) in model.inputs.iter().zip(&self.inputs) {
+            // What is held from sample to sample acts half a sample later on average: around a sample, half the one before.
+            let before = |i: usize| if input.hold == Hold::Zero { samples.get(i.saturating_sub(1)) } else { samples.get(i) };
+            for (i, (sum, now)) in force.iter_mut().zip(samples).enumerate() {
+                *sum += input.gain * 0.5 * (now + before(i)?);
+            }
+        }
+        Some(force)
+    }
+
     /// Bodies from `first` on, those of a hypothesis included, as the one body that a motion input prescribes moves at a sample: index, position, velocity. What
     /// hangs on a body begins with it. Empty where no motion is prescribed, or several are.
     pub(crate) fn along_the_motion(&self, first: usize, model: &Model, at: usize) -> Vec<(usize, f64, f64)> {

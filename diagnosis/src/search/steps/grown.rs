@@ -34,9 +34,8 @@ fn ripples(state: &State) -> Vec<Seed> {
     let records = best.structure.with_unknown(problem, &problem.fit, &best.fit.values);
     let mut hypotheses = course.hypotheses.to_vec();
     let own = course.effects_of(&best.structure, &best.fit.values);
-    let beside = |ripple: (usize, Vec<f64>)| {
-        Seed::beside(problem, (&best.structure, &best.fit.values), [own.clone(), vec![ripple]].concat(), false)
-    };
+    let beside =
+        |ripple: (usize, Vec<f64>)| Seed::beside(problem, (&best.structure, &best.fit.values), [own.clone(), vec![ripple]].concat(), false);
     let is_new = |(index, _): &(usize, Vec<f64>)| {
         course.hypotheses.get(*index).is_some_and(|h| best.structure.added.iter().all(|own| own.id != h.id && own.compatible(h)))
     };
