@@ -181,3 +181,89 @@ fn with_motion(model: &Model, output: usize, record: &Record) -> Option<Record> 
     own.skip = ((SETTLED * rate) as usize).min(own.len / 10);
     Some(own)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output_error::evaluator::Evaluator;
+    use crate::output_error::structure::Structure;
+    use backdrive_plant::recording::Recording;
+
+    const STEP: f64 = 0.0015;
+
+    fn motor(cogging: f64) -> String {
+        format!(
+            "name = 'motor'\nmotion = 'rotation'\n[bodies]\nrotor = 0.0003\n\
+             [[elements]]\nname = 'bearing'\nkind = 'damper'\nbetween = ['rotor', 'ground']\ndamping = 0.001\n\
+             [[elements]]\nname = 'magnets'\nkind = 'cogging'\nbetween = ['rotor', 'ground']\namplitude = {cogging}\nperiod = 0.5\nphase = 0.3\n\
+             [[inputs]]\nname = 'torque'\nkind = 'force'\non = 'rotor'\nhold = 'linear'\n\
+             [[outputs]]\nname = 'angle'\nkind = 'position'\nof = 'rotor'\nresolution = {STEP}\n"
+        )
+    }
+
+    /// A motor that turns on and on, with the torque that this takes against a ripple of 5 mN m; its encoder rounds.
+    fn problem(text: &str) -> Problem {
+        let model = Model::from_toml(text, "motor.toml").unwrap();
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) / 500.0).collect();
+        let waves = [(2.0, 0.6), (0.6, 2.3), (0.1, 5.1)];
+        let order = |t: f64, order: i32| {
+            let wave = |(amplitude, hz): &(f64, f64)| {
+                let pulse = TAU * hz;
+                amplitude * pulse.powi(order) * (pulse * t + f64::from(order) * std::f64::consts::FRAC_PI_2).sin()
+            };
+            let turning = [4.0 * t, 4.0, 0.0][order as usize];
+            turning + waves.iter().map(wave).sum::<f64>()
+        };
+        let torque = |t: &f64| {
+            let [q, v, a] = [0, 1, 2].map(|n| order(*t, n));
+            0.0003 * a + 0.001 * v + 0.005 * (TAU * q / 0.5 + 0.3).sin()
+        };
+        let angle = t.iter().map(|t| (order(*t, 0) / STEP).round() * STEP).collect();
+        let signals = vec![("angle".to_string(), angle), ("torque".to_string(), t.iter().map(torque).collect())];
+        let record = Record::new(&Recording::new("r.csv", t.clone(), signals).unwrap(), &model, Vec::new()).unwrap();
+        Problem::new(text.to_string(), "motor.toml".into(), model, vec![record], Vec::new(), Initial::Free).unwrap()
+    }
+
+    /// Root mean square of what a model leaves beside its recording, in the noise of its encoder.
+    fn left(observed: &Problem) -> f64 {
+        let structure = Structure::new(observed, &observed.fit, Vec::new());
+        let given: Vec<f64> = observed.stated.iter().map(|s| s.given).collect();
+        let residuals = Evaluator::new(observed).residuals(&structure, &structure.values(observed, &given, &[], &[])).unwrap();
+        (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn a_true_model_leaves_the_rounding_of_the_encoder_and_one_without_a_ripple_leaves_it() {
+        let [right, wrong] = [0.005, 1e-9].map(|cogging| left(&observed(&problem(&motor(cogging))).unwrap()));
+        assert!((0.6..1.3).contains(&right), "{right}");
+        assert!(wrong > 2.0, "{wrong}");
+    }
+
+    #[test]
+    fn a_device_without_inertia_and_without_force_does_not_follow_its_recording() {
+        let observed = observed(&problem(&motor(0.005))).unwrap();
+        let mut light = observed.model.clone();
+        light.set_values_at("bodies.rotor", &[3e-7]).unwrap();
+        light.set_values_at("elements.bearing.damping", &[1e-6]).unwrap();
+        light.set_values_at("elements.magnets.amplitude", &[5e-6]).unwrap();
+        // All of it a thousandth, and so is its observer: what a thousandth of the torque drives moves alike, and what none drives does not.
+        let silent = |gain: f64| {
+            let mut model = light.clone();
+            model.inputs[0].gain = gain;
+            left(&Problem { model: rescaled(model, &observed.model), stated: Vec::new(), ..observed.clone() })
+        };
+        assert!(silent(1e-3) < 1.3 && silent(0.0) > 10.0, "{} {}", silent(1e-3), silent(0.0));
+    }
+
+    #[test]
+    fn without_its_observer_a_model_is_what_it_was() {
+        let problem = problem(&motor(0.005));
+        let observed = observed(&problem).unwrap();
+        assert_eq!(without_observer(&observed.model), problem.model);
+        assert_eq!(with_model(&observed, &problem.model).unwrap().model, observed.model);
+        assert_eq!(recorded(&observed).model, problem.model);
+        // A lever on a spring does not drift.
+        let held = motor(0.005).replace("kind = 'damper'", "kind = 'spring'").replace("damping = 0.001", "stiffness = 1.0");
+        assert!(super::observed(&self::problem(&held)).is_none());
+    }
+}
