@@ -14,6 +14,7 @@ mod gate;
 mod graph;
 mod init;
 mod inspect;
+mod live;
 mod model;
 mod network;
 mod node;
@@ -42,6 +43,7 @@ pub use gate::Gate;
 pub use graph::Graph;
 pub use init::Init;
 pub use inspect::Inspect;
+pub use live::Live;
 pub use model::{Model, ModelFile};
 pub use node::{Node, SealedMaster};
 pub use prove::Prove;
@@ -52,7 +54,7 @@ pub use shell::{Completions, Man};
 pub use simulate::Simulate;
 pub use stability::{GRIPS, Stability, spaced};
 pub use test_bench::TestBench;
-pub use why::Why;
+pub use why::{Why, WhyNow};
 
 use clap::{Parser, Subcommand};
 
@@ -139,6 +141,9 @@ pub enum Command {
         after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
     )]
     Clean,
+    /// Show a run in progress, or recordings, on a page: charts, the devices to scale; of a run also its gain, its canceller and a stop.
+    #[command(after_help = live::HELP)]
+    Live(Live),
     /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),
@@ -160,6 +165,9 @@ pub enum Command {
     /// One node of a running graph; the supervisor starts it.
     #[command(hide = true)]
     Node(Node),
+    /// Why a loop shakes at this moment; a run that is watched starts it.
+    #[command(hide = true)]
+    WhyNow(WhyNow),
     /// The master of a proof; the supervisor starts it.
     #[command(hide = true)]
     SealedMaster(SealedMaster),

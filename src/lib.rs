@@ -21,6 +21,7 @@ mod graph;
 mod init;
 pub mod inspect;
 mod interrupt;
+mod live;
 mod model;
 pub mod model_run;
 mod node;
@@ -38,6 +39,7 @@ pub mod simulate;
 pub mod stability;
 mod test_bench;
 pub mod why;
+mod why_now;
 
 use cli::{Cli, Command};
 use std::process::ExitCode;

@@ -74,6 +74,9 @@ pub trait Core: Send {
     /// New gains are wanted from now on. Most cores have none.
     fn set_gains(&mut self, _gains: &Gains) {}
 
+    /// Whether the core is to take part in the loop from now on, faded over `ramp_s` seconds. Only a canceller can be left out of a loop that runs.
+    fn set_active(&mut self, _active: bool, _ramp_s: f64) {}
+
     /// The gains now in force, if the core has any: (mu, lambda).
     fn gains(&self) -> Option<(f64, f64)> {
         None

@@ -343,6 +343,10 @@ impl Core for Wired {
         self.core.set_gains(gains);
     }
 
+    fn set_active(&mut self, active: bool, ramp_s: f64) {
+        self.core.set_active(active, ramp_s);
+    }
+
     fn gains(&self) -> Option<(f64, f64)> {
         self.core.gains()
     }

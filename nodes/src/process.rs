@@ -225,6 +225,8 @@ fn read_lines(control: &Control, start: &SyncSender<Start>) {
             }
             Ok(ToNode::Stop) => control.stop(),
             Ok(ToNode::Gains { mu, lambda, ramp_s }) => control.set_gains(mu, lambda, ramp_s),
+            Ok(ToNode::Canceller { on, ramp_s }) => control.switch_canceller(on, ramp_s),
+            Ok(ToNode::Note(note)) => control.note(note),
             Err(e) => {
                 let _ = writeln!(std::io::stderr(), "not understood from the supervisor: {e}: {line}");
             }

@@ -7,6 +7,8 @@ use std::fmt::Write;
 /// Kind, the text before the number, and after it. Without a second part the number is not shown.
 const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("canceller_off", "the canceller's prediction is not finite: it no longer subtracts, since", Some("s")),
+    ("canceller_switched_off", "the canceller is left out of the loop, faded out over", Some("s")),
+    ("canceller_switched_on", "the canceller is back in the loop, faded in over", Some("s")),
     ("connection_broken", "a message could not be sent or received", None),
     ("controller_off", "the controller's force is not finite: it commands none any more, since", Some("s")),
     ("drive_back", "a controller's forces arrive again, after", Some("steps without any")),

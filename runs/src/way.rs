@@ -108,7 +108,7 @@ fn run_processes(graph: &Graph, place: &Place, watch: &dyn Watch) -> Result<Done
     ready(graph, place.host.as_deref())?;
     too_many_poll(graph, place.host.as_deref(), watch);
     let courier = Courier::start(&place.network).map_err(RunError::machine)?;
-    let mut options = SuperviseOptions { node_command: watch.node_command(), ..SuperviseOptions::default() };
+    let mut options = SuperviseOptions { node_command: watch.node_command(), created: watch.created(), ..SuperviseOptions::default() };
     if place.host.is_some() {
         options.ready_timeout = HOSTS_TIMEOUT;
     }

@@ -21,6 +21,7 @@ pub mod foreign;
 pub mod happening;
 pub mod knob;
 mod named;
+pub mod now;
 pub mod options;
 pub mod recording;
 pub mod remedy;

@@ -29,14 +29,14 @@ fn wrong(error: impl Display) -> RecordingError {
 pub struct Recording {
     /// Its signals.
     pub session: Session,
-    ours: Option<Ours>,
+    pub(crate) ours: Option<Ours>,
 }
 
 /// What a bag of a run holds besides its signals.
-struct Ours {
-    graph: Graph,
-    recorded: Recorded,
-    intents: Option<Vec<Intent>>,
+pub(crate) struct Ours {
+    pub(crate) graph: Graph,
+    pub(crate) recorded: Recorded,
+    pub(crate) intents: Option<Vec<Intent>>,
 }
 
 impl Recording {
