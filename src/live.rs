@@ -6,6 +6,7 @@ use backdrive_launch::alive::find;
 use backdrive_live::LiveError;
 use backdrive_live::bag::Window;
 use backdrive_live::run::{Live, Options};
+use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -28,8 +29,12 @@ pub fn live(options: &cli::Live) -> Result<u8, Failure> {
         let asked = Options { address: Some(options.address), most_lambda: options.most_lambda, why: None };
         let live = Live::open(&paths, &asked, Arc::new(|said: &str| output::note(said)))?;
         if let Some([control, watch]) = live.urls() {
-            output::line(format_args!("page     {control}"))?;
-            output::line(format_args!("to watch {watch}"))?;
+            if options.json {
+                output::line(json!({ "run": paths.id(), "page": control, "to_watch": watch }))?;
+            } else {
+                output::line(format_args!("page     {control}"))?;
+                output::line(format_args!("to watch {watch}"))?;
+            }
         }
         live.wait(&stop);
         return Ok(0);
@@ -38,7 +43,10 @@ pub fn live(options: &cli::Live) -> Result<u8, Failure> {
         return Err(Failure::input("--most-lambda is for a run in progress; omit it with bags"));
     }
     let window = progress::busy("reading", || Window::open(&words, options.address))?;
-    output::line(format_args!("page     {}", window.url()))?;
+    match options.json {
+        true => output::line(json!({ "bags": options.what, "page": window.url() }))?,
+        false => output::line(format_args!("page     {}", window.url()))?,
+    }
     window.wait(&stop);
     Ok(0)
 }

@@ -1,4 +1,4 @@
-//! Why a loop shakes, asked of another process at the lowest priority while the loop runs, and what is done about it.
+//! Why a loop shakes, asked of another process of low priority while the loop runs, and what is done about it.
 
 use crate::hub::{Hub, text};
 use crate::onset::Onset;
@@ -26,8 +26,8 @@ const LEFT: f64 = 0.5;
 /// Causes that are shown.
 const SHOWN: usize = 3;
 
-/// Lowest priority for who looks for the cause.
-const LOWEST: i32 = 19;
+/// Priority of who looks for the cause: below that of every node, and above work that has no hurry at all, for somebody waits for the answer.
+const NICE: i32 = 5;
 
 /// How a run is watched for shaking.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +56,8 @@ pub(crate) struct Healer {
     pub steer: Arc<Steer>,
     pub options: WhyOptions,
     pub bag: Option<PathBuf>,
+    /// Unit of a thousandth of the master's positions.
+    pub unit: &'static str,
     pub level: Level,
     pub over: Arc<AtomicBool>,
     /// The force scale that is offered.
@@ -76,8 +78,9 @@ impl Healer {
         let Onset { axis, time_s, frequency_hz, amplitude, .. } = shakes.onset;
         let begun = Instant::now();
         let title = format!(
-            "shakes at {frequency_hz:.0} Hz, master ±{}, found at {time_s:.3} s, mu*lambda = {:.4}",
-            small(amplitude),
+            "shakes at {frequency_hz:.0} Hz, master ±{:.3} {}, found at {time_s:.3} s, mu*lambda = {:.4}",
+            1e3 * amplitude,
+            self.unit,
             shakes.mu * shakes.lambda
         );
         let title = if axis > 0 { format!("{title}, axis {axis}") } else { title };
@@ -109,6 +112,7 @@ impl Healer {
         let named = lines.first().cloned().unwrap_or_default();
         let confidence = found.causes.first().map_or(NOT_MEASURED, |c| c.1);
         self.tell("live_why", 1, &format!("cause: {named}"), confidence);
+        lines.iter().skip(1).for_each(|line| (self.say)(line));
         lines.push(format!("Named {:.1} s after the onset was found.", begun.elapsed().as_secs_f64()));
         let offered = found.lambda.filter(|lambda| self.now().is_some_and(|now| *lambda < now.1));
         *self.offer.lock().unwrap_or_else(PoisonError::into_inner) = offered;
@@ -122,7 +126,7 @@ impl Healer {
                 if let Some(least) = heal {
                     lines.push(format!("Not applied: lambda = {lambda:.4} is below the bound of {least:.4}."));
                 }
-                let sure = if found.robust { "" } else { " (with this grip only)" };
+                let sure = if found.robust { "" } else { " (not with every grip and wall)" };
                 let offer = format!("Lower λ to {lambda:.4}{sure}");
                 (self.say)(&format!("to do    lower lambda to {lambda:.4}{sure}, on the page or with --heal"));
                 self.show(&title, &lines, Some(json!({ "text": offer, "do": "heal" })));
@@ -161,7 +165,7 @@ impl Healer {
         let left = self.shaking() / shaking.max(f64::MIN_POSITIVE);
         let percent = 100.0 * left;
         let said = if left <= LEFT {
-            let sure = if robust { "" } else { "; with this grip only" };
+            let sure = if robust { "" } else { "; it does not hold with every grip and wall" };
             format!("lambda lowered from {before:.4} to {lambda:.4}: it helped, {percent:.0} % of the oscillation is left{sure}")
         } else {
             let undone = self.set(before).map_or_else(|why| format!("it could not be undone: {why}"), |()| "undone".to_string());
@@ -184,10 +188,11 @@ impl Healer {
         self.hub.past().picture.gains
     }
 
-    /// Into the bag and onto the terminal.
+    /// Into the bag, from where it comes to the terminal; straight there where no node can record it.
     fn tell(&self, kind: &str, severity: u32, said: &str, value: f64) {
-        (self.say)(said);
-        self.steer.note(kind, severity, said, value);
+        if !self.steer.note(kind, severity, said, value) {
+            (self.say)(said);
+        }
     }
 
     /// Onto the page.
@@ -211,7 +216,7 @@ impl Healer {
         // SAFETY: setpriority is safe between fork and exec; 0 is this process.
         unsafe {
             std::os::unix::process::CommandExt::pre_exec(&mut command, || {
-                nix::libc::setpriority(nix::libc::PRIO_PROCESS, 0, LOWEST);
+                nix::libc::setpriority(nix::libc::PRIO_PROCESS, 0, NICE);
                 Ok(())
             });
         }
@@ -232,9 +237,4 @@ impl Healer {
             said.lines().last().unwrap_or("the program that looks for it has failed").trim_start_matches("error: ").to_string()
         })
     }
-}
-
-/// A length or an angle in thousandths, as a person reads it.
-fn small(amplitude: f64) -> String {
-    format!("{:.3} mm or mrad", 1e3 * amplitude)
 }

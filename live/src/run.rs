@@ -92,7 +92,8 @@ impl Live {
         let healer = options.why.as_ref().map(|why| {
             let (hub, steer, over) = (Arc::clone(&hub), Arc::clone(&steer), Arc::clone(&over));
             let bag = graph.bag_of(place.host.as_deref());
-            Arc::new(Healer { hub, steer, options: why.clone(), bag, level, over, offer: Arc::default(), say })
+            let unit = scene.devices.iter().find(|d| d.role == "master").map_or("mm", |d| if d.unit == "rad" { "mrad" } else { "mm" });
+            Arc::new(Healer { hub, steer, options: why.clone(), bag, unit, level, over, offer: Arc::default(), say })
         });
         let answering = match (healer.clone(), shakes) {
             (Some(healer), Some(shakes)) => {

@@ -94,10 +94,10 @@ impl Steer {
         self.ask(&Ask::Gains { mu, lambda: rounded(lambda), ramp_s: self.bounds.ramp_s, by: by.to_string() })
     }
 
-    /// Puts an event into the recording.
-    pub fn note(&self, kind: &str, severity: u32, text: &str, value: f64) {
-        // A run that has ended records nothing more.
-        let _ = self.ask(&Ask::Note { severity, kind: kind.to_string(), text: text.to_string(), value: backdrive_msgs::measured(value) });
+    /// Puts an event into the recording. Whether that was possible: a run that has ended records nothing more.
+    pub fn note(&self, kind: &str, severity: u32, text: &str, value: f64) -> bool {
+        let note = Ask::Note { severity, kind: kind.to_string(), text: text.to_string(), value: backdrive_msgs::measured(value) };
+        self.ask(&note).is_ok()
     }
 
     /// Leaves the canceller out of the loop, or takes it back.

@@ -24,4 +24,7 @@ pub struct Live {
     /// Greatest lambda that may be set from the page: by default 10 times that of the graph with a guard, and that of the graph without one.
     #[arg(long, value_name = "LAMBDA")]
     pub most_lambda: Option<f64>,
+    /// Print the addresses of the page as JSON.
+    #[arg(long)]
+    pub json: bool,
 }

@@ -1,8 +1,11 @@
 //! A headless browser, driven by its DevTools protocol.
 
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tungstenite::stream::MaybeTlsStream;
@@ -27,7 +30,7 @@ impl Browser {
             let mut command = Command::new(program);
             command.args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "about:blank"]);
             command.arg(format!("--user-data-dir={}", profile.path().display()));
-            command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().ok()
+            command.stderr(Stdio::piped()).stdout(Stdio::null()).process_group(0).spawn().ok()
         })?;
         let mut lines = BufReader::new(child.stderr.take()?);
         let address = loop {
@@ -40,8 +43,13 @@ impl Browser {
         std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::sink()));
         let mut stream = TcpStream::connect(&address).unwrap();
         write!(stream, "GET /json HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).unwrap();
+        // The browser keeps the connection open: what it says ends with its list.
+        stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        let (mut answer, mut some) = (String::new(), [0; 4096]);
+        while !answer.trim_end().ends_with(']') {
+            let read = stream.read(&mut some).unwrap();
+            answer.push_str(&String::from_utf8_lossy(&some[..read]));
+        }
         let pages: Value = serde_json::from_str(&answer[answer.find('[').unwrap()..]).unwrap();
         let (socket, _) = tungstenite::connect(pages[0]["webSocketDebuggerUrl"].as_str().unwrap()).unwrap();
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
@@ -101,7 +109,8 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        let _ = self.child.kill();
+        // The program may be a script that has started another one.
+        let _ = killpg(Pid::from_raw(self.child.id() as i32), Signal::SIGKILL);
         let _ = self.child.wait();
     }
 }

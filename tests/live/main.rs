@@ -1,6 +1,8 @@
 //! The window on a run: its page, what may be changed from it and by whom, and what the bag keeps of that.
 
 mod browser;
+mod cost;
+mod shaking;
 mod viewer;
 
 use backdrive_bags::Reader;
@@ -19,6 +21,7 @@ const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 struct Run {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
+    /// To change something, and to watch.
     pub pages: [String; 2],
     pub lines: Vec<String>,
     _temp: tempfile::TempDir,
@@ -26,12 +29,18 @@ struct Run {
 }
 
 impl Run {
-    /// Starts a graph in real time with a page.
-    fn start(graph: &str, more: &[&str]) -> Run {
+    /// Starts a graph in real time, with a page if it is to be shown.
+    fn start(graph: &str, more: &[&str], shown: bool) -> Run {
         let temp = tempfile::tempdir().unwrap();
         let bag = temp.path().join("run.mcap");
         let mut command = Command::new(env!("CARGO_BIN_EXE_backdrive"));
-        command.current_dir(FOLDER).args(["run", graph, "--clock", "realtime", "--live", "--json"]).arg("--bag").arg(&bag).args(more);
+        command
+            .current_dir(FOLDER)
+            .args(["run", graph, "--clock", "realtime", "--json"])
+            .args(shown.then_some("--live"))
+            .arg("--bag")
+            .arg(&bag)
+            .args(more);
         let mut child = command.env("TMPDIR", temp.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut run = Run {
             stderr: BufReader::new(child.stderr.take().unwrap()),
@@ -41,6 +50,9 @@ impl Run {
             _temp: temp,
             bag,
         };
+        if !shown {
+            return run;
+        }
         let control = run.line_with("page ");
         let watch = run.line_with("to watch ");
         run.pages = [control, watch].map(|line| line.split_whitespace().last().unwrap().to_string());
@@ -104,7 +116,7 @@ fn told(bag: &Path) -> (Vec<(String, String)>, Vec<f64>) {
 
 #[test]
 fn a_viewer_sees_and_changes_a_run_others_may_not_and_the_bag_has_it_all() {
-    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "60"]);
+    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "60"], true);
     let [control, watch] = run.pages.clone();
     let path = &control[control.rfind('/').unwrap()..];
     // Who has no token, a wrong one, or comes from another site.
@@ -170,7 +182,7 @@ fn a_viewer_sees_and_changes_a_run_others_may_not_and_the_bag_has_it_all() {
 
 #[test]
 fn a_run_in_progress_gets_a_window_and_recordings_are_shown_over_each_other() {
-    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "4"]);
+    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "4"], true);
     let temp = run.bag.parent().unwrap().to_path_buf();
     let serve = |words: &[&str]| {
         let mut child = Command::new(env!("CARGO_BIN_EXE_backdrive"))
@@ -221,7 +233,7 @@ fn the_page_is_driven_in_a_browser() {
         eprintln!("skipped: no chromium-headless-shell, chromium or google-chrome is installed");
         return;
     };
-    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "60"]);
+    let run = Run::start("launch/contact.toml", &["--rate", "1000", "--duration", "60"], true);
     browser.open(&run.pages[0], 420, 1600);
     browser.until("document.querySelectorAll('.chart canvas').length >= 2 && !document.getElementById('stop').disabled");
     // Nothing is wider than a narrow screen.

@@ -5,14 +5,17 @@
 
 use crate::as_recorded::as_recorded;
 use crate::cause::{Asked, Cause, causes, reproduces};
+use crate::change::Change;
 use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
 use crate::recording::{Recording, RecordingError};
+use crate::remedy::{doubts, holds, robust};
 use crate::trial::Hand;
 use backdrive_control::operator::Intent;
 use backdrive_stability::by_itself::alone::AloneError;
 use backdrive_stability::by_itself::compared::SMALL;
+use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -28,11 +31,8 @@ const LEAD_S: f64 = 0.3;
 /// Time for which it then stays where it is at the end, s: a loop is judged while the hand rests.
 const REST_S: f64 = 0.8;
 
-/// A lower gain is this share of the critical gain.
-const BELOW: f64 = 0.8;
-
-/// Grips at which a lower gain must hold as well, as factors on the grip of the graph.
-const GRIPS: [f64; 2] = [0.7, 1.5];
+/// Shares of the critical gain that are tried as a lower gain, as [`crate::remedy`] does.
+const BELOW: [f64; 3] = [0.8, 0.5, 0.25];
 
 /// Why there is no answer.
 #[derive(Debug, thiserror::Error)]
@@ -77,7 +77,7 @@ pub struct Found {
     pub edge: Option<f64>,
     /// The force scale that is offered; `None` where none below the one in force helps.
     pub lambda: Option<f64>,
-    /// Whether the loop is stable at it with grips of 0.7 to 1.5 times as well.
+    /// Whether the loop is stable at it also with grips of 0.7 to 1.5 times and on walls of 0.5 to 2 times.
     pub robust: bool,
 }
 
@@ -111,7 +111,7 @@ pub fn why_now(bag: &Path, seen: &Seen, hear: &(dyn Fn(&str) + Sync), cancel: &A
     let (session, ours) = (&recording.session, recording.ours.as_ref().ok_or(NowError::NoGraph)?);
     let (graph, recorded) = (&ours.graph, &ours.recorded);
     let unit = backdrive_stability::verdict::recorded_traces(session).first().map_or(backdrive_stability::outcome::Unit::Metre, |t| t.unit);
-    let happening = Happening::LimitCycle { amplitude_m: seen.amplitude, frequency_hz: seen.frequency_hz, unit };
+    let mut happening = Happening::LimitCycle { amplitude_m: seen.amplitude, frequency_hz: seen.frequency_hz, unit };
     let gain = Gain { mu: seen.mu, lambda: seen.lambda };
     let look = Look { small: SMALL, patience: Duration::ZERO };
     let Differences { found, .. } = differences(graph, recorded, &look, hear, cancel)?;
@@ -123,28 +123,46 @@ pub fn why_now(bag: &Path, seen: &Seen, hear: &(dyn Fn(&str) + Sync), cancel: &A
     hear("the loop as recorded");
     let run = was.run(&hand, gain, &RunOptions::default(), cancel)?;
     answer.reproduced = reproduces(&happening, &run.outcome, run.frequency_hz);
-    answer.edge = was.edge(&hand, gain.product(), cancel)?.critical_gain;
+    // A limit of the motors hides what happens beneath: then the causes are looked for without it.
+    let (mut loop_of_causes, mut always, mut does) = (was.clone(), Vec::new(), run.outcome);
+    if let Outcome::Limited { .. } = run.outcome {
+        Change::NoLimits.apply(&mut loop_of_causes);
+        always.push(Change::NoLimits);
+        let beneath = loop_of_causes.run(&hand, gain, &RunOptions::default(), cancel)?;
+        if Happening::of_run(&beneath).is_trouble() {
+            (happening, does, answer.reproduced) = (Happening::of_run(&beneath), beneath.outcome, true);
+        }
+    }
+    answer.edge = loop_of_causes.edge(&hand, gain.product(), cancel)?.critical_gain;
     hear("without each suspect");
     let asked = Asked {
         graph,
-        was: &was,
+        was: &loop_of_causes,
         differences: &found,
         hand: &hand,
         gain,
         happening: &happening,
-        again: &run.outcome,
-        always: &[],
+        again: &does,
+        always: &always,
         edge: answer.edge,
         reproduced: answer.reproduced,
-        shakes_again: answer.reproduced || !run.outcome.is_stable(),
+        shakes_again: answer.reproduced || !does.is_stable(),
     };
     answer.causes = causes(&asked, cancel)?.into_iter().map(|c| (words(&c), c.confidence)).collect();
-    if let Some(lambda) = answer.edge.map(|edge| BELOW * edge / seen.mu.abs()).filter(|lambda| *lambda < seen.lambda) {
-        hear("at a lower gain");
+    hear("at lower gains");
+    let unsure = doubts(&found);
+    for lambda in answer.edge.iter().flat_map(|edge| BELOW.map(|share| share * edge / seen.mu.abs())).filter(|lambda| *lambda < seen.lambda)
+    {
         let lower = Gain { mu: seen.mu, lambda };
-        let holds = was.holds(&hand, lower, &[1.0, GRIPS[0], GRIPS[1]], cancel)?;
-        answer.lambda = holds.first().filter(|o| o.is_stable()).map(|_| lambda);
-        answer.robust = holds.iter().all(|o| o.is_stable());
+        if !holds(&was, &hand, lower, cancel)? {
+            continue;
+        }
+        answer.robust = robust(&was, &hand, lower, (true, &unsure), cancel)?;
+        // The highest that holds with other grips and walls; where none does, the lowest that was tried.
+        answer.lambda = Some(lambda);
+        if answer.robust {
+            break;
+        }
     }
     Ok(answer)
 }
