@@ -14,14 +14,15 @@ use nix::libc;
 use serde_json::{Value, json};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 use tokio::sync::{broadcast, watch};
 
 /// Longest message of a viewer, bytes.
 const MOST_BYTES: usize = 8192;
 
-/// How long what is said last may take.
-const LAST_WORDS: Duration = Duration::from_millis(400);
+/// How long what is said last may take, at most: a viewer on a busy machine is given time to hear it.
+const LAST_WORDS: Duration = Duration::from_secs(3);
 
 /// The answer to a viewer.
 pub(crate) enum Reply {
@@ -54,6 +55,23 @@ struct Served {
     desk: Arc<dyn Desk>,
     access: Access,
     over: watch::Receiver<bool>,
+    viewers: Arc<AtomicUsize>,
+}
+
+/// Counts a viewer for as long as it is there.
+struct Present(Arc<AtomicUsize>);
+
+impl Present {
+    fn new(viewers: &Arc<AtomicUsize>) -> Present {
+        viewers.fetch_add(1, Ordering::SeqCst);
+        Present(Arc::clone(viewers))
+    }
+}
+
+impl Drop for Present {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 /// Everything of the window yields to the loop.
@@ -76,7 +94,7 @@ impl Server {
         let token = || Key::fresh().map(|key| key.to_hex()[..32].to_string()).map_err(LiveError::machine);
         let access = Access { control: token()?, watch: token()?, port: address.port() };
         let (over, ends) = watch::channel(false);
-        let served = Served { desk, access: access.clone(), over: ends };
+        let served = Served { desk, access: access.clone(), over: ends, viewers: Arc::default() };
         let thread = std::thread::Builder::new().name("live-server".to_string()).spawn(move || {
             yield_to_others();
             if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() {
@@ -106,12 +124,17 @@ impl Drop for Server {
 
 async fn listen(listener: std::net::TcpListener, served: Served) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-    let mut over = served.over.clone();
+    let (mut over, viewers) = (served.over.clone(), Arc::clone(&served.viewers));
     let router = Router::new().route("/", get(show)).route("/ws", get(talk)).with_state(served);
     let service = router.into_make_service_with_connect_info::<SocketAddr>();
     tokio::select! {
         _ = async { serve(listener, service).await } => {}
-        _ = over.wait_for(|over| *over) => tokio::time::sleep(LAST_WORDS).await,
+        () = async { let _ = over.wait_for(|over| *over).await; } => {
+            let until = tokio::time::Instant::now() + LAST_WORDS;
+            while viewers.load(Ordering::SeqCst) > 0 && tokio::time::Instant::now() < until {
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        }
     }
 }
 
@@ -168,7 +191,7 @@ async fn talk(
 
 /// Serves one viewer to the end.
 async fn attend(mut socket: WebSocket, served: Served, role: Role, from: SocketAddr) {
-    let by = format!("page {from}");
+    let (by, _present) = (format!("page {from}"), Present::new(&served.viewers));
     let (past, mut news) = served.desk.join();
     let mut over = served.over.clone();
     let first = json!({ "type": "role", "control": role == Role::Control });
@@ -208,7 +231,11 @@ async fn attend(mut socket: WebSocket, served: Served, role: Role, from: SocketA
                 }
             }
             Err(()) => {
-                let _ = socket.send(Frame::Close(None)).await;
+                // The other side answers before the connection goes, so that it loses nothing.
+                if socket.send(Frame::Close(None)).await.is_ok() {
+                    let answered = async { while socket.recv().await.is_some_and(|said| said.is_ok()) {} };
+                    let _ = tokio::time::timeout(Duration::from_millis(500), answered).await;
+                }
                 return;
             }
         }

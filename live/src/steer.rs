@@ -7,8 +7,9 @@ use backdrive_launch::asks::{Answer, Ask, AskLine, MOST_TEXT};
 use backdrive_msgs::margin::KNOWN;
 use backdrive_nodes::graph::Graph;
 use serde::Serialize;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 /// With a guard the gain may be raised to this many times the largest one of the graph file, unless a bound is given.
 const WITH_GUARD: f64 = 10.0;
@@ -16,7 +17,7 @@ const WITH_GUARD: f64 = 10.0;
 /// Shortest ramp of a change by hand, s: well above the guard's window of 50 ms.
 const RAMP_S: f64 = 0.25;
 
-/// A refused attempt is recorded at most this often; those between are counted.
+/// Refused attempts of the same kind within this time are recorded together.
 const EVERY: Duration = Duration::from_secs(1);
 
 /// Within what the gain of a run may be changed from outside.
@@ -46,7 +47,8 @@ pub(crate) struct Steer {
     paths: RunPaths,
     pub bounds: Bounds,
     has_guard: bool,
-    refused: Mutex<(Option<Instant>, u64)>,
+    /// Attempts that wait to be recorded, by the reason for which they were refused.
+    refused: Mutex<BTreeMap<String, u64>>,
 }
 
 /// Why it is not done, or what was done.
@@ -54,7 +56,7 @@ pub(crate) type Done = Result<String, String>;
 
 impl Steer {
     pub fn new(paths: RunPaths, bounds: Bounds, has_guard: bool) -> Steer {
-        Steer { paths, bounds, has_guard, refused: Mutex::new((None, 0)) }
+        Steer { paths, bounds, has_guard, refused: Mutex::default() }
     }
 
     fn ask(&self, ask: &Ask) -> Done {
@@ -120,19 +122,26 @@ impl Steer {
         }
     }
 
-    /// Records an attempt that was refused.
-    pub fn refused(&self, by: &str, why: &str) {
+    /// Records an attempt that was refused: the first of its kind at once, those of the next second together.
+    pub fn refused(self: &Arc<Steer>, by: &str, why: &str) {
         let mut refused = self.refused.lock().unwrap_or_else(PoisonError::into_inner);
-        refused.1 += 1;
-        if refused.0.is_some_and(|at| at.elapsed() < EVERY) {
+        if let Some(waiting) = refused.get_mut(why) {
+            *waiting += 1;
             return;
         }
-        let (count, now) = (std::mem::take(&mut refused.1), Instant::now());
-        refused.0 = Some(now);
+        refused.insert(why.to_string(), 0);
         drop(refused);
-        let text = format!("{by} was refused: {why}");
-        // A run that has ended records nothing more.
-        let _ = self.ask(&Ask::Note { severity: 1, kind: "live_refused".to_string(), text, value: Some(count as f64) });
+        let (steer, by, why) = (Arc::clone(self), by.to_string(), why.to_string());
+        let record = move || {
+            steer.note("live_refused", 1, &format!("{by} was refused: {why}"), 1.0);
+            std::thread::sleep(EVERY);
+            let more = steer.refused.lock().unwrap_or_else(PoisonError::into_inner).remove(&why).unwrap_or(0);
+            if more > 0 {
+                steer.note("live_refused", 1, &format!("{more} more attempts were refused: {why}"), more as f64);
+            }
+        };
+        // Without a thread nothing is recorded, and the attempt is refused all the same.
+        let _ = std::thread::Builder::new().name("live-refused".to_string()).spawn(record);
     }
 }
 

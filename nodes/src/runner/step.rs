@@ -143,7 +143,9 @@ impl Runner {
             member.teller.report.peak_effort = 0.0;
             member.loop_time_recent.clear();
             // What is sent rarely, such as the gains in force, reaches who joins late only where its publisher looks for new listeners.
-            member.side_outputs().for_each(|output| drop(output.publisher.listeners()));
+            for output in member.side_outputs() {
+                let _ = output.publisher.listeners();
+            }
         }
     }
 
