@@ -78,7 +78,12 @@ fn end_with_the_reader(command: &Command) {
     use nix::sys::signal::{SigHandler, Signal, signal};
     if !matches!(
         command,
-        Command::Run(_) | Command::Prove(_) | Command::Node(_) | Command::SealedMaster(_) | Command::Bag(cli::Bag::Play { .. })
+        Command::Run(_)
+            | Command::Live(_)
+            | Command::Prove(_)
+            | Command::Node(_)
+            | Command::SealedMaster(_)
+            | Command::Bag(cli::Bag::Play { .. })
     ) {
         // SAFETY: the default action replaces none of ours.
         let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };

@@ -32,8 +32,7 @@ pub fn live(options: &cli::Live) -> Result<u8, Failure> {
             if options.json {
                 output::line(json!({ "run": paths.id(), "page": control, "to_watch": watch }))?;
             } else {
-                output::line(format_args!("page     {control}"))?;
-                output::line(format_args!("to watch {watch}"))?;
+                output::line(format_args!("page     {control}\nto watch {watch}"))?;
             }
         }
         live.wait(&stop);

@@ -91,7 +91,7 @@ impl Window {
     }
 }
 
-/// Reads a bag: its curves, and what a viewer is told of it.
+/// Reads a bag: its curves, and what a viewer is sent of it.
 fn read(path: &Path) -> Result<(Recording, Value), LiveError> {
     let reader = Reader::open_begun(path).map_err(LiveError::input)?;
     let graph = graph_of(&reader, &Overrides::default()).map_err(LiveError::input)?;

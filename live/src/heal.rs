@@ -2,6 +2,7 @@
 
 use crate::hub::{Hub, text};
 use crate::onset::Onset;
+use crate::serve::NICE;
 use crate::steer::Steer;
 use crate::tap::Running;
 use backdrive_msgs::NOT_MEASURED;
@@ -15,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Longest time that a cause is looked for.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Time after the ramp of a remedy after which it must have helped.
 const HELPS_WITHIN: Duration = Duration::from_millis(600);
@@ -26,9 +27,6 @@ const LEFT: f64 = 0.5;
 /// Causes that are shown.
 const SHOWN: usize = 3;
 
-/// Priority of who looks for the cause: below that of every node, and above work that has no hurry at all, for somebody waits for the answer.
-const NICE: i32 = 5;
-
 /// How a run is watched for shaking.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WhyOptions {
@@ -38,7 +36,7 @@ pub struct WhyOptions {
     pub heal: Option<f64>,
 }
 
-/// What a watch tells.
+/// What a watch reports.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shakes {
     pub onset: Onset,

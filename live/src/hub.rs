@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::broadcast;
 
-/// Frames that a slow viewer may be behind: about four seconds. Then it loses some, and is told.
+/// Frames that a slow viewer may be behind: about four seconds. Then it loses some, and is sent a note of that.
 const QUEUE: usize = 256;
 
 /// What a new viewer is sent first.

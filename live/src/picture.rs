@@ -19,7 +19,7 @@ struct Port {
     work_j: f64,
 }
 
-/// An event as it is shown.
+/// An event in the form that a viewer gets.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Shown {
     /// s since the start of the run.

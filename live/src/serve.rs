@@ -58,7 +58,7 @@ struct Served {
     viewers: Arc<AtomicUsize>,
 }
 
-/// Counts a viewer for as long as it is there.
+/// Counts a viewer while it is connected.
 struct Present(Arc<AtomicUsize>);
 
 impl Present {
@@ -74,10 +74,13 @@ impl Drop for Present {
     }
 }
 
+/// Priority of everything of the window, and of who looks for a cause: below that of every node, and above work that has no hurry.
+pub(crate) const NICE: i32 = 5;
+
 /// Everything of the window yields to the loop.
 pub(crate) fn yield_to_others() {
     // SAFETY: a plain call; on Linux 0 is the calling thread. Where it is refused the thread keeps its priority.
-    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 10) };
+    let _ = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 impl Server {

@@ -62,7 +62,7 @@ impl Past for Running {
     }
 }
 
-/// Says to all who look, and to all who come, how the run has ended.
+/// Shows every viewer, also later ones, how the run has ended.
 pub(crate) fn end(hub: &Hub<Running>, how: &str) {
     let mut past = hub.past();
     if past.ended.is_none() {

@@ -13,6 +13,9 @@ use crate::recording::{Recording, RecordingError};
 use crate::remedy::{doubts, holds, robust};
 use crate::trial::Hand;
 use backdrive_control::operator::Intent;
+use backdrive_control::scaling::{GainChange, GainPlan};
+use backdrive_msgs::Gains;
+use backdrive_nodes::graph::{Graph, Settings};
 use backdrive_stability::by_itself::alone::AloneError;
 use backdrive_stability::by_itself::compared::SMALL;
 use backdrive_stability::outcome::Outcome;
@@ -102,6 +105,24 @@ fn hand(intents: &[Intent], rows: usize, rate_hz: f64) -> Hand {
     Hand { intents: Some(intents.iter().map(of).collect()), steps: (lead + kept + rest) as u64, rate_hz }
 }
 
+/// The graph with the gains that were in force, whoever set them: the graph file, a person or the guard.
+fn as_run(graph: &Graph, recorded: &[(String, Gains)]) -> Graph {
+    let mut graph = graph.clone();
+    let Some(topic) = graph.loop_node().map(|node| format!("/{}/gains", node.name)) else { return graph };
+    let mut gains = recorded.iter().filter(|(of, _)| *of == topic).map(|(_, gains)| gains);
+    let Some(first) = gains.next() else { return graph };
+    let period_s = graph.period_s();
+    // Half a step before, so that rounding does not shift it by one.
+    let at = |g: &Gains| GainChange { at_s: (g.step as f64 - 0.5) * period_s, mu: g.mu, lambda: g.lambda };
+    graph.gains = GainPlan { mu: first.mu, lambda: first.lambda, ramp_s: 0.0, changes: gains.map(at).collect() };
+    for node in &mut graph.nodes {
+        if let Settings::Scaling { guard, .. } = &mut node.settings {
+            *guard = false;
+        }
+    }
+    graph
+}
+
 /// Why a loop shakes, from its bag so far. `hear` receives what is being done.
 ///
 /// # Errors
@@ -114,7 +135,7 @@ pub fn why_now(bag: &Path, seen: &Seen, hear: &(dyn Fn(&str) + Sync), cancel: &A
     let mut happening = Happening::LimitCycle { amplitude_m: seen.amplitude, frequency_hz: seen.frequency_hz, unit };
     let gain = Gain { mu: seen.mu, lambda: seen.lambda };
     let look = Look { small: SMALL, patience: Duration::ZERO };
-    let Differences { found, .. } = differences(graph, recorded, &look, hear, cancel)?;
+    let Differences { found, .. } = differences(&as_run(graph, &recorded.gains), recorded, &look, hear, cancel)?;
     let differs = found.iter().map(|d| named(d, graph).2).collect();
     let mut answer = Found { causes: Vec::new(), differs, reproduced: false, edge: None, lambda: None, robust: false };
     let Some(intents) = &ours.intents else { return Ok(answer) };
