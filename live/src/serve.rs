@@ -141,7 +141,7 @@ async fn listen(listener: std::net::TcpListener, served: Served) {
     }
 }
 
-fn word<'a>(headers: &'a HeaderMap, name: header::HeaderName) -> Option<&'a str> {
+fn word(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
@@ -149,18 +149,18 @@ fn token(uri: &Uri) -> Option<&str> {
     uri.query()?.split('&').find_map(|pair| pair.strip_prefix("token="))
 }
 
-fn admitted(served: &Served, from: SocketAddr, headers: &HeaderMap, uri: &Uri) -> Result<Role, Response> {
+fn admitted(served: &Served, from: SocketAddr, headers: &HeaderMap, uri: &Uri) -> Result<Role, Box<Response>> {
     let checked = served.access.check(word(headers, header::HOST), word(headers, header::ORIGIN), token(uri));
     checked.map_err(|why| {
         let (desk, by) = (Arc::clone(&served.desk), format!("page {from}"));
         tokio::task::spawn_blocking(move || desk.refused(&by, why));
-        (StatusCode::FORBIDDEN, format!("refused: {why}. Open the address that `backdrive` printed.\n")).into_response()
+        (StatusCode::FORBIDDEN, format!("refused: {why}. Open the address that `backdrive` printed.\n")).into_response().into()
     })
 }
 
 async fn show(State(served): State<Served>, ConnectInfo(from): ConnectInfo<SocketAddr>, headers: HeaderMap, uri: Uri) -> Response {
     if let Err(refusal) = admitted(&served, from, &headers, &uri) {
-        return refusal;
+        return *refusal;
     }
     let Ok(nonce) = Key::fresh().map(|key| key.to_hex()[..32].to_string()) else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
@@ -187,7 +187,7 @@ async fn talk(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     match admitted(&served, from, &headers, &uri) {
-        Err(refusal) => refusal,
+        Err(refusal) => *refusal,
         Ok(role) => upgrade.max_message_size(MOST_BYTES).on_upgrade(move |socket| attend(socket, served, role, from)),
     }
 }
