@@ -143,7 +143,8 @@ impl Recording {
         for (place, curve) in self.curves.iter().enumerate() {
             let first = curve.steps.partition_point(|step| f64::from(*step) / self.rate_hz < from);
             for (step, value) in curve.steps[first..].iter().zip(&curve.values[first..]) {
-                let at = ((f64::from(*step) / self.rate_hz - from) / width) as usize;
+                // Rounding must not put a sample that begins a part into the one before.
+                let at = ((f64::from(*step) / self.rate_hz - from) / width + 1e-9) as usize;
                 let Some(row) = ranges.get_mut(at) else { break };
                 let range = &mut row[place];
                 *range = [range[0].min(*value), range[1].max(*value)];

@@ -212,7 +212,8 @@ mod tests {
     #[test]
     fn an_oscillation_is_found_within_a_third_of_a_second_with_its_frequency() {
         for rate_hz in [200.0, 1000.0, 5000.0] {
-            for hz in [11.0, 25.0, 60.0] {
+            // At fewer than eight samples a period the held force lags too far behind what the sine says to put energy in.
+            for hz in [11.0, 25.0, 60.0].into_iter().filter(|hz| 8.0 * hz <= rate_hz) {
                 let found = drive(hz, 0.8, |t| if t < 1.0 { 0.0 } else { 1.0 }, 3.0, rate_hz);
                 let [onset] = found[..] else { panic!("{rate_hz} Hz, {hz} Hz: {found:?}") };
                 assert!(onset.time_s > 1.0 && onset.time_s <= 1.35, "{rate_hz} Hz, {hz} Hz: at {} s", onset.time_s);
