@@ -5,6 +5,7 @@ mod bag;
 mod bridge;
 mod changes;
 mod compare;
+mod device;
 mod diagnose;
 mod doctor;
 mod export;
@@ -33,6 +34,7 @@ pub use bag::{Bag, BagExport, BagImport, ExportTo};
 pub use bridge::Bridge;
 pub use changes::words_of;
 pub use compare::Compare;
+pub use device::{Device, DeviceFind, DeviceNew, Emulate};
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use export::Export;
@@ -139,6 +141,9 @@ pub enum Command {
         after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
     )]
     Clean,
+    /// Find what answers on a bus, write a device's file, check it, or emulate a bus of servos.
+    #[command(subcommand)]
+    Device(Device),
     /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),
