@@ -1,4 +1,4 @@
-//! What every bus of joints does, in SI units: read the joints, give them goals, let go.
+//! What every bus of joints does, in SI units: read the joints, give them goals, release them.
 
 use std::time::Duration;
 

@@ -135,13 +135,7 @@ impl Drop for Driver {
 impl Health {
     /// Of a bus that has done nothing yet.
     pub fn fresh() -> Health {
-        Health {
-            rate_hz: f64::NAN,
-            jitter_p99_s: f64::NAN,
-            round_trip_p50_s: f64::NAN,
-            round_trip_p99_s: f64::NAN,
-            ..Health::default()
-        }
+        Health { rate_hz: f64::NAN, jitter_p99_s: f64::NAN, round_trip_p50_s: f64::NAN, round_trip_p99_s: f64::NAN, ..Health::default() }
     }
 }
 

@@ -203,7 +203,8 @@ fn read_joint(table: &mut Table, protocol: Protocol) -> Result<Joint, FileError>
     let model = table.integer("model", 0, 65_535)?.map(|m| m as u32);
     let takes = table.need_one_of("takes", &Takes::ALL)?;
     if takes == Takes::Effort && matches!(protocol, Protocol::FeetechSts | Protocol::FeetechScs) {
-        let message = "a Feetech servo takes no torque; write takes = \"position\" for a slave, or \"nothing\" for a master that gives no force";
+        let message =
+            "a Feetech servo takes no torque; write takes = \"position\" for a slave, or \"nothing\" for a master that gives no force";
         return Err(table.error_at("takes", message));
     }
     let zero = table.number_or("zero", Range::Any, protocol.middle())?;
@@ -221,7 +222,9 @@ fn read_joint(table: &mut Table, protocol: Protocol) -> Result<Joint, FileError>
     let (speed, effort) = (table.number("speed", Range::Positive)?, table.number("effort", Range::Positive)?);
     let (stiffness, damping) = (table.number("stiffness", Range::NonNegative)?, table.number("damping", Range::NonNegative)?);
     if takes == Takes::Position && protocol == Protocol::Mit && (stiffness.is_none() || damping.is_none()) {
-        return Err(table.error("follows positions by the stiffness and damping of its frames: add stiffness = N_M_PER_RAD and damping = N_M_S_PER_RAD"));
+        return Err(table.error(
+            "follows positions by the stiffness and damping of its frames: add stiffness = N_M_PER_RAD and damping = N_M_S_PER_RAD",
+        ));
     }
     let torque_constant = table.number("torque_constant", Range::Positive)?;
     let current_signed = table.boolean("current_signed")?.unwrap_or(protocol == Protocol::Dynamixel2);

@@ -41,7 +41,16 @@ pub fn only_read(port: &Path, protocol: Protocol, baud: u32, ids: impl Iterator<
     };
     let name = "found".to_string();
     // A servo on a pty or a slow adapter needs a few ms.
-    DeviceFile { name, protocol, port: port.to_path_buf(), baud, timeout_s: 0.004, retries: 1, ramp_s: 0.0, joints: ids.map(joint).collect() }
+    DeviceFile {
+        name,
+        protocol,
+        port: port.to_path_buf(),
+        baud,
+        timeout_s: 0.004,
+        retries: 1,
+        ramp_s: 0.0,
+        joints: ids.map(joint).collect(),
+    }
 }
 
 /// Asks every id who it is.

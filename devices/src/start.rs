@@ -1,9 +1,9 @@
 //! Start of a device: its port or an emulator, and the checks before its motors go on.
 
-use crate::dynamixel::Dynamixel;
 use crate::bus::{Bus, BusError, Reading};
-use crate::file::{DeviceFile, Protocol, Takes};
+use crate::dynamixel::Dynamixel;
 use crate::feetech::Feetech;
+use crate::file::{DeviceFile, Protocol, Takes};
 use crate::mit::Mit;
 use crate::side::Side;
 use std::io::{BufRead, BufReader};
@@ -161,8 +161,10 @@ fn all_read(bus: &mut dyn Bus, file: &DeviceFile) -> Result<Vec<Reading>, String
 /// It cannot be started, or reports an error.
 pub fn emulator_of(file: &Path) -> Result<(Child, PathBuf), String> {
     let program = std::env::current_exe().map_err(|e| format!("the emulator cannot be started: {e}"))?;
+    // As this node itself was started: words before `node` belong to the program, such as those of an interpreter.
+    let words: Vec<String> = std::env::args().skip(1).take_while(|word| word != "node").collect();
     let mut command = Command::new(program);
-    command.args(["device", "emulate", "--end-with-input"]).arg(file).stdin(Stdio::piped()).stdout(Stdio::piped());
+    command.args(words).args(["device", "emulate", "--end-with-input"]).arg(file).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = command.spawn().map_err(|e| format!("the emulator cannot be started: {e}"))?;
     let mut line = String::new();
     let read = child.stdout.take().map(|out| BufReader::new(out).read_line(&mut line));

@@ -86,7 +86,8 @@ fn a_torque_accelerates_as_newton_says() {
         let present = read(bus.as_mut());
         bus.engage(&present).unwrap();
         // 0.05 N m on 0.01 kg m^2 with 0.1 N m s/rad: a speed of 0.5 rad/s, with a time constant of 0.1 s.
-        let wanted = |read: &Reading| read.velocity.is_some_and(|v| (v - 0.5).abs() < 0.03) && read.effort.is_some_and(|e| (e - 0.05).abs() < 0.006);
+        let wanted =
+            |read: &Reading| read.velocity.is_some_and(|v| (v - 0.5).abs() < 0.03) && read.effort.is_some_and(|e| (e - 0.05).abs() < 0.006);
         assert_eq!(cycle(bus.as_mut(), Goal::Effort(0.05), &wanted), Ok(()), "{protocol}");
         // Long after, it is no faster.
         for _ in 0..100 {

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Runs an emulator until it is interrupted, its time is over, or its standard input ends where that is asked for.
 pub fn emulate(options: &cli::Emulate) -> Result<u8, Failure> {
     let file = EmulatorFile::load(&options.file)?;
-    let faults = Faults::of(&options.faults, file.seed).map_err(Failure::input)?;
+    let faults = Faults::of(&[file.faults.as_slice(), &options.faults].concat(), file.seed).map_err(Failure::input)?;
     let stop = interrupt::heard()?;
     let mut emulator = open(&file, faults, options.link.as_deref()).map_err(Failure::machine)?;
     if options.end_with_input {

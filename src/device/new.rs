@@ -37,7 +37,11 @@ pub fn new(options: &cli::DeviceNew) -> Result<u8, Failure> {
     let bauds = options.baud.map_or(USUAL_BAUDS.to_vec(), |baud| vec![baud]);
     let found = find(&options.port, &protocols(options.protocol.as_deref())?, &bauds, ids(&options.ids)?).map_err(Failure::machine)?;
     let Some(bus) = found.into_iter().next() else {
-        output::line(format!("nothing answers on {}; `backdrive device find {}` tries more", options.port.display(), options.port.display()))?;
+        output::line(format!(
+            "nothing answers on {}; `backdrive device find {}` tries more",
+            options.port.display(),
+            options.port.display()
+        ))?;
         return Ok(code::NEGATIVE);
     };
     let file = only_read(&options.port, bus.protocol, bus.baud, bus.answers.iter().map(|who| who.id));
@@ -140,13 +144,21 @@ fn sign_by_motion(file: &DeviceFile, joint: &Known, yes: bool) -> Result<f64, Fa
     bus.release().map_err(Failure::machine)?;
     let moved = present[0].position.map_or(0.0, |p| p - start);
     if moved.abs() < 0.3 * SMALL_MOTION {
-        let message = format!("{}: was commanded by {SMALL_MOTION} rad and moved by {moved:.3}; is its power on, is it blocked?", joint.name);
+        let message =
+            format!("{}: was commanded by {SMALL_MOTION} rad and moved by {moved:.3}; is its power on, is it blocked?", joint.name);
         return Err(Failure::machine(message));
     }
     if yes {
         return Ok(1.0);
     }
-    let answer = ask(&format!("{}: it went {} and came back. Was that its positive direction? y/n", joint.name, if way > 0.0 { "up in counts" } else { "down in counts" }), "y")?;
+    let answer = ask(
+        &format!(
+            "{}: it went {} and came back. Was that its positive direction? y/n",
+            joint.name,
+            if way > 0.0 { "up in counts" } else { "down in counts" }
+        ),
+        "y",
+    )?;
     Ok(if answer.starts_with(['n', 'N']) { -way } else { way })
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 pub trait Emulated {
     /// What a device's file names as its port.
     fn port(&self) -> &Path;
-    /// Runs until `ended` says so; it is asked once a period of the loop inside of the servos.
+    /// Runs until `ended` gives true; it is asked once a period of the loop inside of the servos.
     fn run(&mut self, ended: &mut dyn FnMut() -> bool);
     /// What went wrong on purpose so far.
     fn faults(&self) -> Vec<(&'static str, u64)>;

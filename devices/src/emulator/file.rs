@@ -1,5 +1,6 @@
 //! An emulator's file: its bus, and for each servo the plant that it hides and the loop inside of it.
 
+use super::faults::Faults;
 use crate::file::Protocol;
 use backdrive_plant::elements::Range;
 use backdrive_plant::model::{Fragment, Model};
@@ -63,6 +64,8 @@ pub struct EmulatorFile {
     pub loop_hz: f64,
     /// Seed of noise and faults.
     pub seed: u64,
+    /// What goes wrong, in the words of [`super::Faults::of`].
+    pub faults: Vec<String>,
     /// In any order.
     pub servos: Vec<ServoFile>,
 }
@@ -84,13 +87,15 @@ impl EmulatorFile {
             return Err(table.error_at("loop_hz", format!("must be from 100 to 10 000 Hz, is {loop_hz}")));
         }
         let seed = table.integer("seed", 0, i64::MAX)?.unwrap_or(1) as u64;
+        let faults = table.strings("faults")?.unwrap_or_default();
+        Faults::of(&faults, seed).map_err(|e| table.error_at("faults", e.to_string()))?;
         let tables = table.tables("servos")?;
         if tables.is_empty() {
             return Err(table.missing("servos"));
         }
         let servos = tables.into_iter().map(|servo| read_servo(servo, folder, protocol)).collect::<Result<Vec<_>, _>>()?;
         table.finish()?;
-        Ok(EmulatorFile { protocol, baud, latency_s, loop_hz, seed, servos })
+        Ok(EmulatorFile { protocol, baud, latency_s, loop_hz, seed, faults, servos })
     }
 }
 

@@ -80,7 +80,10 @@ impl Drop for Running {
 
 /// A device's file for joints with ids from 1; `more` is added to each joint.
 pub fn device(protocol: &str, port: &Path, joints: u32, takes: &str, more: &str) -> DeviceFile {
-    let mut text = format!("name = \"device\"\nprotocol = \"{protocol}\"\nport = \"{}\"\nbaud = 1000000\ntimeout_s = 0.05\nramp_s = 0.0\n", port.display());
+    let mut text = format!(
+        "name = \"device\"\nprotocol = \"{protocol}\"\nport = \"{}\"\nbaud = 1000000\ntimeout_s = 0.05\nramp_s = 0.0\n",
+        port.display()
+    );
     for id in 1..=joints {
         text.push_str(&format!("[[joints]]\nname = \"j{id}\"\nid = {id}\ntakes = \"{takes}\"\nrange = [-6.0, 6.0]\n"));
         text.push_str("effort = 1.0\ntorque_constant = 1.0\nstiffness = 20.0\ndamping = 0.4\n");

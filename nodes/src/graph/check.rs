@@ -84,7 +84,10 @@ fn slaves_are_driven(graph: &Graph, of_node: &OfNode, of_connection: &OfConnecti
                 }
             };
             if feeding(wanted).is_none() {
-                return Err(of_node(node, format!("its device takes {}, and nothing is connected to its input \"{wanted}\"", device.file.takes().name())));
+                return Err(of_node(
+                    node,
+                    format!("its device takes {}, and nothing is connected to its input \"{wanted}\"", device.file.takes().name()),
+                ));
             }
             continue;
         }
