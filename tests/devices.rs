@@ -93,6 +93,7 @@ fn a_pulled_cable_is_reported_and_what_was_not_measured_is_absent() {
     let original = format!("\"{}/emulated-follower.toml\"", file("launch/servo-pair"));
     let graph = pair(&place, &[("duration_s = 20.0", "duration_s = 4.0"), (&original, &format!("\"{emulator}\""))]);
     let done = place.backdrive(&["run", &graph, "--bag", "pulled.mcap"]);
+    assert_eq!(done.code, Some(6), "a run that lost its device is no success: {done:?}");
     assert_names(&done.stderr, &["device_gone"]);
     let follower = samples(&place.path("pulled.mcap"), "/follower/measured_js");
     let last = follower.iter().rposition(|s| measured(s.position[0]).is_some()).unwrap();

@@ -35,6 +35,7 @@ pub struct DeviceCore {
     was_decaying: bool,
     was_holding: bool,
     was_silent: bool,
+    told_gone: bool,
     stopped: Option<&'static str>,
 }
 
@@ -60,6 +61,7 @@ impl DeviceCore {
             was_decaying: false,
             was_holding: false,
             was_silent: false,
+            told_gone: false,
             stopped: None,
         }
     }
@@ -151,8 +153,13 @@ impl DeviceCore {
         self.silent_steps = if complete { 0 } else { self.silent_steps + 1 };
         let silent = self.silent_steps > self.hold_steps;
         if silent && !self.was_silent {
-            let kind = if is_there { "device_silent" } else { "device_gone" };
-            events.push(kind, self.silent_steps as f64, 2);
+            let (kind, severity) = if is_there { ("device_silent", 1) } else { ("device_gone", 2) };
+            events.push(kind, self.silent_steps as f64, severity);
+            self.told_gone = !is_there;
+        } else if silent && !is_there && !self.told_gone {
+            // Silence comes first where a cable is pulled.
+            events.push("device_gone", self.silent_steps as f64, 2);
+            self.told_gone = true;
         } else if !silent && self.was_silent {
             events.push("device_answers", NOT_MEASURED, 0);
         }
