@@ -273,10 +273,9 @@ impl Bus for Dynamixel {
         let mut failed = Ok(());
         for index in 0..self.joints.len() {
             for register in [r::WATCHDOG, r::TORQUE] {
-                match self.set(index, register, &[0]) {
-                    // One that is silent does not keep the others on.
-                    Err(error @ BusError::Port { .. }) => failed = Err(error),
-                    Ok(()) | Err(_) => {}
+                // One that is silent does not keep the others on.
+                if let Err(error @ BusError::Port { .. }) = self.set(index, register, &[0]) {
+                    failed = Err(error);
                 }
             }
         }

@@ -46,11 +46,8 @@ impl DynamixelServos {
         let word = |at: u16| [written[usize::from(at)], written[usize::from(at) + 1]];
         let touched = |first: u16, count: u16| address < first + count && usize::from(first) < at + values.len();
         match written[usize::from(r::MODE)] {
-            _ if !on => {
-                if !servo.is_off() {
-                    servo.set(Drive::Off);
-                }
-            }
+            _ if !on && !servo.is_off() => servo.set(Drive::Off),
+            _ if !on => {}
             r::MODE_CURRENT if touched(r::GOAL_CURRENT, 2) || touched(r::TORQUE, 1) => {
                 let counts = i16::from_le_bytes(word(r::GOAL_CURRENT));
                 let current = f64::from(counts) * r::ampere(Some(servo.file().model_number));
