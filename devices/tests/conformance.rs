@@ -89,13 +89,15 @@ fn a_torque_accelerates_as_newton_says() {
         let wanted =
             |read: &Reading| read.velocity.is_some_and(|v| (v - 0.5).abs() < 0.03) && read.effort.is_some_and(|e| (e - 0.05).abs() < 0.006);
         assert_eq!(cycle(bus.as_mut(), Goal::Effort(0.05), &wanted), Ok(()), "{protocol}");
-        // Long after, it is no faster.
-        for _ in 0..100 {
+        // And it keeps that speed: the encoder's counts make single readings of it ripple.
+        let mut speeds = Vec::new();
+        for _ in 0..200 {
             bus.write(&[Goal::Effort(0.05)]).unwrap();
-            let now = read(bus.as_mut())[0];
-            assert!(now.velocity.is_none_or(|v| v < 0.56), "{protocol}: {now:?}");
+            speeds.extend(read(bus.as_mut())[0].velocity);
             std::thread::sleep(Duration::from_millis(5));
         }
+        let mean = speeds.iter().sum::<f64>() / speeds.len().max(1) as f64;
+        assert!((mean - 0.5).abs() < 0.08, "{protocol}: {mean} rad/s");
         bus.release().unwrap();
     }
 }
@@ -132,7 +134,10 @@ fn faults_are_counted_and_give_no_wrong_reading() {
     for (protocol, _) in BUSES {
         for fault in ["silent", "corrupt", "late", "twice", "other_id", "checksum"] {
             let mut emulator = Running::start(protocol, 2, &[&format!("{fault}=0.3@0..0.5")]);
-            let mut bus = open(&device(protocol, &emulator.port, 2, "nothing", "")).unwrap();
+            let mut file = device(protocol, &emulator.port, 2, "nothing", "");
+            // Less than what is late is late by.
+            file.timeout_s = 0.012;
+            let mut bus = open(&file).unwrap();
             let (begun, mut whole) = (Instant::now(), 0);
             while begun.elapsed() < Duration::from_millis(600) {
                 for reading in read(bus.as_mut()) {

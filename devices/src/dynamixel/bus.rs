@@ -119,15 +119,20 @@ impl Dynamixel {
         let joint = &self.joints[index];
         let long = |at: usize| i32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
         let counts = f64::from(i16::from_le_bytes([p[0], p[1]]));
-        let current = counts * r::ampere(joint.model);
+        // Its unit depends on the model: without one the current is not known.
+        let current = joint.model.map(|model| counts * r::ampere(Some(model)));
         let direction = joint.per_count.signum();
         // Per count of position a turn is `per_count` times its counts; its velocity counts are of the shaft.
         let per_rad = joint.per_count.abs() * 4096.0 / std::f64::consts::TAU;
         Reading {
             position: Some(joint.position(f64::from(long(6)))),
             velocity: Some(f64::from(long(2)) * r::RAD_PER_S * direction * per_rad),
-            effort: joint.torque_constant.filter(|_| joint.current_signed).map(|constant| constant * current * direction),
-            current: Some(if joint.current_signed { current } else { current.abs() }),
+            effort: joint
+                .torque_constant
+                .filter(|_| joint.current_signed)
+                .zip(current)
+                .map(|(constant, current)| constant * current * direction),
+            current: current.map(|current| if joint.current_signed { current } else { current.abs() }),
             temperature: Some(f64::from(p[20])),
             status: u32::from(error),
         }
@@ -245,6 +250,9 @@ impl Bus for Dynamixel {
 
     fn engage(&mut self, present: &[Reading]) -> Result<(), BusError> {
         for index in 0..self.joints.len() {
+            if self.joints[index].model.is_none() {
+                self.identify(index)?;
+            }
             // A mode is changed with torque off, and a watchdog that has barked is reset by 0.
             self.set(index, r::TORQUE, &[0])?;
             self.set(index, r::WATCHDOG, &[0])?;
