@@ -5,7 +5,7 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, live, model, prove, replay, run, secret, shell,
+    bag, bridge, compare, device, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, live, model, prove, replay, run, secret, shell,
     simulate, stability, test_bench, why, why_now,
 };
 use clap::Parser;
@@ -63,6 +63,7 @@ fn dispatched(command: &Command) -> Result<u8, Failure> {
         | Command::Prove(_)
         | Command::Live(_)
         | Command::Bridge(_)
+        | Command::Device(_)
         | Command::Node(_)
         | Command::SealedMaster(_)
         | Command::Bag(cli::Bag::Play { .. }) => {
@@ -99,6 +100,7 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Secret(options) => secret::secret(options),
         Command::Live(options) => live::live(options),
         Command::Bridge(options) => bridge::bridge(options),
+        Command::Device(command) => device::device(command),
         Command::Doctor(options) => doctor::doctor(options),
         Command::Prove(options) => prove::prove(options),
         Command::Completions(options) => shell::completions(options),

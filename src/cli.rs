@@ -5,6 +5,7 @@ mod bag;
 mod bridge;
 mod changes;
 mod compare;
+mod device;
 mod diagnose;
 mod doctor;
 mod export;
@@ -34,6 +35,7 @@ pub use bag::{Bag, BagExport, BagImport, ExportTo};
 pub use bridge::Bridge;
 pub use changes::words_of;
 pub use compare::Compare;
+pub use device::{Device, DeviceFind, DeviceNew, Emulate};
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use export::Export;
@@ -144,6 +146,9 @@ pub enum Command {
     /// Show a run in progress, or recordings, on a page: charts, the devices to scale; of a run also its gain, its canceller and a stop.
     #[command(after_help = live::HELP)]
     Live(Live),
+    /// Find what answers on a bus, write a device's file, check it, or emulate a bus of servos.
+    #[command(subcommand)]
+    Device(Device),
     /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),

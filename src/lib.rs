@@ -10,6 +10,7 @@ pub mod caller;
 mod cli;
 mod columns;
 pub mod compare;
+mod device;
 pub mod diagnose;
 mod doctor;
 pub mod export;

@@ -51,6 +51,7 @@ pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn T
     let timing = timing.clone();
     line.supervised(|line| {
         let mut runner = Runner::together(plans, &timing, transport, options.run)?;
+        runner.begin(&mut |told| line.tell(told))?;
         let Some(start) = line.meet(|| runner.check_alone().map(|()| runner.missing()))? else {
             return Ok(NodeStatus::default());
         };

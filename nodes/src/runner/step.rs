@@ -57,6 +57,16 @@ impl Runner {
             member.teller.report.margin = Some(MarginStatus::from(&margin));
             first_error = first_error.and(output.publisher.send(&Message::Margin(margin)));
         }
+        if stage.is_first && step >= member.lists_due {
+            member.lists_due = step + (self.timing.rate_hz / LISTS_HZ).ceil() as u64;
+            for (index, output) in member.lists.iter_mut().enumerate() {
+                let Some(values) = stage.core.report(index) else { continue };
+                let mut list = Sample { position: values, source: member.teller.book.source, step, stamp_ns, ..Sample::new(output.axes) };
+                (list.layout, list.sequence) = (LAYOUT, output.sequence);
+                output.sequence += 1;
+                first_error = first_error.and(output.publisher.send(&Message::Sample(list)));
+            }
+        }
         for (sample, output) in stage.samples.iter_mut().zip(&mut stage.outputs) {
             (sample.layout, sample.source) = (LAYOUT, member.teller.book.source);
             (sample.step, sample.sequence, sample.stamp_ns) = (step, output.sequence, stamp_ns);
@@ -167,3 +177,6 @@ impl Runner {
 }
 
 const REPORT_EVERY_NS: i64 = 100_000_000;
+
+/// Lists of named numbers per second.
+const LISTS_HZ: f64 = 10.0;
