@@ -166,7 +166,12 @@ impl Surveyed {
         if let Some(done) = &self.done {
             let Progress { done: answered, kept, all } = done.progress;
             let shard = if self.shard.1 > 1 { format!(" of shard {} of {}", self.shard.0, self.shard.1) } else { String::new() };
-            lines.push(format!("fleet     {answered} of {all} recordings{shard} answered, {kept} of them before"));
+            let without = match done.failed.len() {
+                0 => String::new(),
+                failed if failed == answered => ", none of them with an answer".to_string(),
+                failed => format!(", {failed} of them without an answer"),
+            };
+            lines.push(format!("fleet     {answered} of {all} recordings{shard} done{without}, {kept} of them before"));
             for (name, why) in done.failed.iter().take(LISTED) {
                 lines.push(format!("no answer {name}: {why}"));
             }

@@ -61,6 +61,7 @@ pub fn main() -> ExitCode {
     end_with_the_reader(&command);
     let result = match &command {
         Command::Node(options) => return node::node(options),
+        Command::Step(options) => return node::step(options),
         Command::SealedMaster(options) => return prove::sealed_master(options),
         command => call::dispatch(command),
     };
@@ -76,7 +77,12 @@ fn end_with_the_reader(command: &Command) {
     use nix::sys::signal::{SigHandler, Signal, signal};
     if !matches!(
         command,
-        Command::Run(_) | Command::Prove(_) | Command::Node(_) | Command::SealedMaster(_) | Command::Bag(cli::Bag::Play { .. })
+        Command::Run(_)
+            | Command::Prove(_)
+            | Command::Node(_)
+            | Command::Step(_)
+            | Command::SealedMaster(_)
+            | Command::Bag(cli::Bag::Play { .. })
     ) {
         // SAFETY: the default action replaces none of ours.
         let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };

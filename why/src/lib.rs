@@ -24,6 +24,7 @@ mod named;
 pub mod options;
 pub mod recording;
 pub mod remedy;
+pub mod seen;
 mod stairs;
 mod stated;
 pub mod throw;
