@@ -157,6 +157,8 @@ impl Surveyed {
         match &self.analysis {
             _ if failed => code::BAD_INPUT,
             Some(found) if !found.changes.is_empty() || !found.together.is_empty() || !found.odd.is_empty() => code::NEGATIVE,
+            // Where every recording is left out nothing is known.
+            Some(found) if counted(found) == 0 => code::CANNOT_TELL,
             _ => 0,
         }
     }
@@ -199,11 +201,18 @@ impl Surveyed {
         said("odd", found.odd.iter().map(|odd| odd.sentence.as_str()).collect());
         said("left out", found.left_out.iter().map(|left| left.recording.as_str()).collect());
         said("note", found.notes.iter().map(String::as_str).collect());
-        if self.code() == 0 {
-            lines.push(format!("answer    nothing changed on {} units in {} recordings", found.units, found.recordings));
+        match self.code() {
+            0 => lines.push(format!("answer    nothing changed on {} units in {} recordings that count", found.units, counted(found))),
+            code::CANNOT_TELL => lines.push("answer    not known: every recording is left out".to_string()),
+            _ => {}
         }
         lines.join("\n") + "\n"
     }
+}
+
+/// Recordings that are not left out.
+fn counted(found: &Analysis) -> usize {
+    found.recordings.saturating_sub(found.left_out.len())
 }
 
 /// Time that is left, by the recordings that were not kept from before.

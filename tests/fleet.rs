@@ -128,7 +128,7 @@ fn the_gate_names_what_changed_in_a_loop_and_what_that_does_to_its_limit() {
         }
         place.write(&format!("{name}.toml"), &text);
         let bag = format!("{name}.mcap");
-        let done = place.backdrive(&["run", &format!("{name}.toml"), "--transport", "inproc", "--bag", &bag]);
+        let done = place.backdrive(&["run", &format!("{name}.toml"), "--transport", "inproc", "--canceller", "none", "--bag", &bag]);
         assert!([Some(0), Some(1)].contains(&done.code), "{done:?}");
         bag
     };

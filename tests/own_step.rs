@@ -58,8 +58,9 @@ fn a_master_in_python_keeps_up_in_lockstep_and_holds_the_loop() {
 fn the_same_master_in_cpp_does_the_same_to_the_bit() {
     let place = Place::new();
     let program = place.path("own_master");
-    let built = Command::new("g++").args(["-O2", "-std=c++17", "-Wall", "-Werror", "-ffp-contract=off"]);
-    let built = { built }.arg(file("examples/own_master.cpp")).arg("-o").arg(&program).status();
+    let mut build = Command::new("g++");
+    build.args(["-O2", "-std=c++17", "-Wall", "-Werror", "-ffp-contract=off"]);
+    let built = build.arg(file("examples/own_master.cpp")).arg("-o").arg(&program).status();
     match built {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return eprintln!("SKIPPED: g++ is not installed"),
         built => assert!(built.unwrap().success()),

@@ -12,12 +12,15 @@ use crate::join::{fail, join_run};
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_msgs::{NOT_MEASURED, Sample};
 use backdrive_nodes::graph::{Graph, Node, StageKind};
+use backdrive_nodes::protocol::FromNode;
 use serde::Serialize;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
 use std::time::Duration;
 
+/// Exit code of a run whose node failed.
+const NODE_FAILED: u8 = 6;
 /// Time that a program has to end after its standard input did.
 const GRACE: Duration = Duration::from_millis(500);
 
@@ -154,8 +157,10 @@ impl Core for Stepped {
             // A core cannot fail, and a node without its core must not go on: the supervisor hears why, and ends the run.
             let why = self.ended(&error);
             let _ = self.child.kill();
-            let _ = fail(why, 6);
-            std::process::exit(6);
+            let line = serde_json::to_string(&FromNode::Failed { error: why, code: NODE_FAILED }).unwrap_or_default();
+            // Past the lock of standard output, which the thread that reports holds.
+            let _ = nix::unistd::write(std::io::stdout(), format!("{line}\n").as_bytes());
+            std::process::exit(i32::from(NODE_FAILED));
         }
         let mut numbers = self.answer.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap_or_default()));
         for sample in outputs.iter_mut() {

@@ -12,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+/// The check that no model of a loop got worse.
+const MODELS: &str = "models";
 /// Changes that a sentence lists; the others are counted.
 const LISTED: usize = 6;
 
@@ -40,7 +42,9 @@ pub(super) fn loops(old: &Loops, new: &Loops, bounds: &Bounds, notes: &mut Vec<S
         changes.extend(stated.iter().map(Stated::words));
         out.extend(stated.iter().map(|one| of_stated(one, bounds)));
         for one in unstated(&before.seen, &after.seen) {
-            changes.push(one.sentence.trim_start_matches("loop: ").to_string());
+            if one.quantity != MODELS {
+                changes.push(one.sentence.trim_start_matches("loop: ").to_string());
+            }
             out.push(one);
         }
         let same_place =
@@ -105,7 +109,7 @@ fn unstated(old: &[Seen], new: &[Seen]) -> Vec<Check> {
     let removed = only(old, new).into_iter().map(|one| check(one, Outcome::Passed, ", in the old recordings only"));
     let mut out: Vec<Check> = added.chain(removed).collect();
     if !out.iter().any(|check| check.outcome == Outcome::Failed) {
-        out.push(single(Kind::Physics, "loop", "models", Outcome::Passed, "loop: every model fits as before".to_string()));
+        out.push(single(Kind::Physics, "loop", MODELS, Outcome::Passed, "loop: every model fits as before".to_string()));
     }
     out
 }
@@ -140,7 +144,7 @@ fn by_models(old: &Table, new: &Table) -> Vec<Check> {
             format!("loop: the model of {} does not fit any more: `backdrive why` finds what it lacks", added.join(" and ")),
         ),
     };
-    vec![single(Kind::Physics, "loop", "models", outcome, sentence)]
+    vec![single(Kind::Physics, "loop", MODELS, outcome, sentence)]
 }
 
 fn of_verdict(old: &Table, new: &Table) -> Check {
