@@ -155,9 +155,9 @@ fn the_gate_names_what_changed_in_a_loop_and_what_that_does_to_its_limit() {
     // A softer wall is a parameter of the slave's environment.
     let wall = std::fs::read_to_string(file("plant/environments/stiff-wall.toml")).unwrap();
     let number = wall.lines().find_map(|line| line.trim().strip_prefix("stiffness = ")).unwrap().split('#').next().unwrap().trim();
-    place.write("wall.toml", &wall.replacen(&format!("stiffness = {number}"), "stiffness = 3000.0", 1));
+    place.write("softer-wall.toml", &wall.replacen(&format!("stiffness = {number}"), "stiffness = 3000.0", 1));
     let stated = format!("\"{}\"", file("plant/environments/stiff-wall.toml"));
-    let softer = gated(&graph("wall", &[(&stated, "\"wall.toml\"")]));
+    let softer = gated(&graph("wall", &[(&stated, "\"softer-wall.toml\"")]));
     let found: Vec<String> = softer.json()["checks"]
         .as_array()
         .unwrap()

@@ -1,9 +1,9 @@
 //! Delay and lost motion of a position servo: its answer to the recorded commands, simulated and fitted.
 //!
 //! In the regression a delay and a damping are one lag. They differ in time: a delay moves everything, a damping rounds it. So a second order with delay,
-//! offset, dry friction and weight is fitted by output error ([`backdrive_servo::fit`]), and standard errors are those of leaving out stretches (jackknife).
-//! Play is no parameter of its own: half of it has the effect of dry friction, to within the noise of a usual sensor. Both together, and a dead band, are the
-//! lost motion at a reversal; which of them it is a diagnosis of many recordings finds.
+//! offset, dry friction, play and weight is fitted by output error ([`backdrive_servo::fit`]), and standard errors are those of leaving out stretches
+//! (jackknife). Half of a play has the effect of dry friction, to within the noise of a usual sensor. So only their sum is given, the lost motion at a
+//! reversal; which of them it is a diagnosis of many recordings finds.
 
 use backdrive_diagnosis::recordings::noise::{step_of, white};
 use backdrive_plant::servo::{Number, Numbers};
@@ -12,8 +12,8 @@ use backdrive_servo::record::Record;
 use backdrive_signal::statistics::{deviation, rms};
 
 /// What is fitted.
-const FREE: [Number; 7] =
-    [Number::Delay, Number::Inertia, Number::Damping, Number::Offset, Number::Friction, Number::MomentCos, Number::MomentSin];
+const FREE: [Number; 8] =
+    [Number::Delay, Number::Inertia, Number::Damping, Number::Offset, Number::Friction, Number::Play, Number::MomentCos, Number::MomentSin];
 /// Shares of the lag that are a delay at the start.
 const SHARES: [f64; 4] = [0.1, 0.4, 0.7, 0.95];
 /// Steps of the fits from each start, and of the one from the better one.
@@ -57,24 +57,25 @@ pub fn response(record: &Record, start: &Start) -> Response {
         numbers[Number::Delay] = share * lag;
         numbers[Number::Damping] = (1.0 - share) * lag;
         numbers[Number::Inertia] = (0.3 * (1.0 - share) * lag).powi(2);
-        numbers[Number::Friction] = start.dead_zone;
+        numbers[Number::Friction] = 0.5 * start.dead_zone;
+        numbers[Number::Play] = start.dead_zone;
         problem.fit(&FREE, &numbers, SCREEN, None)
     };
     let Some(better) = SHARES.map(from).into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return none };
     let fit = problem.fit(&FREE, &better.numbers, FULL, None);
     let folds = problem.leave_out(&fit);
-    let jackknife = |number: Number| {
-        let mean = folds.iter().map(|fold| fold[number]).sum::<f64>() / folds.len().max(1) as f64;
-        let squares = folds.iter().map(|fold| (fold[number] - mean).powi(2)).sum::<f64>();
-        (squares * (folds.len() as f64 - 1.0) / folds.len().max(1) as f64).sqrt()
-    };
-    let estimate = |number: Number, floor: f64, most: f64| {
+    let estimate = |of: &dyn Fn(&Numbers) -> f64, floor: f64, most: f64| {
+        let each: Vec<f64> = folds.iter().map(of).collect();
+        let count = each.len().max(1) as f64;
+        let mean = each.iter().sum::<f64>() / count;
         // At its bound a parameter of every fold is the same; it is known no better than the sensor resolves.
-        let sd = jackknife(number).hypot(floor);
-        (fit.numbers[number].is_finite() && sd <= most).then_some((fit.numbers[number], sd))
+        let sd = (each.iter().map(|x| (x - mean).powi(2)).sum::<f64>() * (count - 1.0) / count).sqrt().hypot(floor);
+        let value = of(&fit.numbers);
+        (value.is_finite() && sd <= most).then_some((value, sd))
     };
-    let lost = estimate(Number::Friction, resolution, start.dead_zone.max(fit.numbers[Number::Friction]).max(2.0 * resolution));
-    Response { delay: estimate(Number::Delay, OF_TIME, lag), lost_motion: lost.map(|(value, sd)| (2.0 * value, 2.0 * sd)) }
+    let lost = |numbers: &Numbers| 2.0 * numbers[Number::Friction] + numbers[Number::Play];
+    let most = lost(&fit.numbers).max(2.0 * start.dead_zone).max(4.0 * resolution);
+    Response { delay: estimate(&|numbers| numbers[Number::Delay], OF_TIME, lag), lost_motion: estimate(&lost, resolution, most) }
 }
 
 #[cfg(test)]
