@@ -65,6 +65,7 @@ fn dispatched(command: &Command) -> Result<u8, Failure> {
         | Command::Bridge(_)
         | Command::Device(_)
         | Command::Node(_)
+        | Command::Step(_)
         | Command::SealedMaster(_)
         | Command::Bag(cli::Bag::Play { .. }) => {
             let message = "this verb starts processes; run it from the command line".to_string();
@@ -105,7 +106,7 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Prove(options) => prove::prove(options),
         Command::Completions(options) => shell::completions(options),
         Command::Man(options) => shell::man(options),
-        Command::Node(_) | Command::SealedMaster(_) => Ok(0), // the two that end as they like: `main` sees to them
+        Command::Node(_) | Command::Step(_) | Command::SealedMaster(_) => Ok(0), // those that end as they like: `main` sees to them
     }
 }
 

@@ -47,7 +47,7 @@ pub use init::Init;
 pub use inspect::Inspect;
 pub use live::Live;
 pub use model::{Model, ModelFile};
-pub use node::{Node, SealedMaster};
+pub use node::{Node, SealedMaster, Step};
 pub use prove::Prove;
 pub use replay::Replay;
 pub use run::Run;
@@ -167,6 +167,9 @@ pub enum Command {
     /// Write manual pages: one for this program and one for every verb.
     #[command(after_help = shell::MAN_HELP)]
     Man(Man),
+    /// A node of a graph that is a program in any language: it reads the inputs of each step, and writes the outputs.
+    #[command(after_help = node::STEP_HELP)]
+    Step(Step),
     /// One node of a running graph; the supervisor starts it.
     #[command(hide = true)]
     Node(Node),

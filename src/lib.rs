@@ -64,6 +64,7 @@ pub fn main() -> ExitCode {
     end_with_the_reader(&command);
     let result = match &command {
         Command::Node(options) => return node::node(options),
+        Command::Step(options) => return node::step(options),
         Command::SealedMaster(options) => return prove::sealed_master(options),
         command => call::dispatch(command),
     };
@@ -83,6 +84,7 @@ fn end_with_the_reader(command: &Command) {
             | Command::Live(_)
             | Command::Prove(_)
             | Command::Node(_)
+            | Command::Step(_)
             | Command::SealedMaster(_)
             | Command::Bag(cli::Bag::Play { .. })
     ) {

@@ -48,6 +48,7 @@ mod session;
 mod signals;
 mod slot;
 mod status;
+pub mod step_program;
 mod supervise;
 mod sweep;
 mod tell;

@@ -25,6 +25,7 @@ pub mod now;
 pub mod options;
 pub mod recording;
 pub mod remedy;
+pub mod seen;
 mod stairs;
 mod stated;
 pub mod throw;

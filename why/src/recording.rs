@@ -21,6 +21,13 @@ use std::sync::atomic::AtomicBool;
 #[error("{0}")]
 pub struct RecordingError(String);
 
+impl RecordingError {
+    /// Of an error as a sentence.
+    pub(crate) fn of(error: &dyn Display) -> RecordingError {
+        RecordingError(error.to_string())
+    }
+}
+
 fn wrong(error: impl Display) -> RecordingError {
     RecordingError(error.to_string())
 }
