@@ -81,7 +81,6 @@ pub fn node(name: &str, stages: Vec<Stage>) -> NodePlan {
         gains_out: has_gains.then(|| side("gains", Kind::Gains)),
         lists: Vec::new(),
         margin_out: None,
-        lists: Vec::new(),
     }
 }
 
