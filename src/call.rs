@@ -5,8 +5,8 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, model, prove, replay, run, secret, shell,
-    simulate, stability, test_bench, why,
+    bag, bridge, compare, device, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, live, model, prove, replay, run, secret, shell,
+    simulate, stability, test_bench, why, why_now,
 };
 use clap::Parser;
 use std::sync::Arc;
@@ -61,8 +61,11 @@ fn dispatched(command: &Command) -> Result<u8, Failure> {
     match command {
         Command::Run(_)
         | Command::Prove(_)
+        | Command::Live(_)
         | Command::Bridge(_)
+        | Command::Device(_)
         | Command::Node(_)
+        | Command::Step(_)
         | Command::SealedMaster(_)
         | Command::Bag(cli::Bag::Play { .. }) => {
             let message = "this verb starts processes; run it from the command line".to_string();
@@ -79,6 +82,7 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Replay(options) => replay::replay(options),
         Command::Stability(options) => stability::stability(options),
         Command::Why(options) => why::why(options),
+        Command::WhyNow(options) => why_now::answer(options),
         Command::Compare(options) => compare::compare(options),
         Command::Inspect(options) => inspect::inspect(options),
         Command::Init(options) => init::init(options),
@@ -95,12 +99,14 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Bag(command) => bag::bag(command),
         Command::Clean => run::clean(),
         Command::Secret(options) => secret::secret(options),
+        Command::Live(options) => live::live(options),
         Command::Bridge(options) => bridge::bridge(options),
+        Command::Device(command) => device::device(command),
         Command::Doctor(options) => doctor::doctor(options),
         Command::Prove(options) => prove::prove(options),
         Command::Completions(options) => shell::completions(options),
         Command::Man(options) => shell::man(options),
-        Command::Node(_) | Command::SealedMaster(_) => Ok(0), // the two that end as they like: `main` sees to them
+        Command::Node(_) | Command::Step(_) | Command::SealedMaster(_) => Ok(0), // those that end as they like: `main` sees to them
     }
 }
 

@@ -5,6 +5,7 @@ mod bag;
 mod bridge;
 mod changes;
 mod compare;
+mod device;
 mod diagnose;
 mod doctor;
 mod export;
@@ -14,6 +15,7 @@ mod gate;
 mod graph;
 mod init;
 mod inspect;
+mod live;
 mod model;
 mod network;
 mod node;
@@ -33,6 +35,7 @@ pub use bag::{Bag, BagExport, BagImport, ExportTo};
 pub use bridge::Bridge;
 pub use changes::words_of;
 pub use compare::Compare;
+pub use device::{Device, DeviceFind, DeviceNew, Emulate};
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use export::Export;
@@ -42,8 +45,9 @@ pub use gate::Gate;
 pub use graph::Graph;
 pub use init::Init;
 pub use inspect::Inspect;
+pub use live::Live;
 pub use model::{Model, ModelFile};
-pub use node::{Node, SealedMaster};
+pub use node::{Node, SealedMaster, Step};
 pub use prove::Prove;
 pub use replay::Replay;
 pub use run::Run;
@@ -52,7 +56,7 @@ pub use shell::{Completions, Man};
 pub use simulate::Simulate;
 pub use stability::{GRIPS, Stability, spaced};
 pub use test_bench::TestBench;
-pub use why::Why;
+pub use why::{Why, WhyNow};
 
 use clap::{Parser, Subcommand};
 
@@ -139,6 +143,12 @@ pub enum Command {
         after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
     )]
     Clean,
+    /// Show a run in progress, or recordings, on a page: charts, the devices to scale; of a run also its gain, its canceller and a stop.
+    #[command(after_help = live::HELP)]
+    Live(Live),
+    /// Find what answers on a bus, write a device's file, check it, or emulate a bus of servos.
+    #[command(subcommand)]
+    Device(Device),
     /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),
@@ -157,9 +167,15 @@ pub enum Command {
     /// Write manual pages: one for this program and one for every verb.
     #[command(after_help = shell::MAN_HELP)]
     Man(Man),
+    /// A node of a graph that is a program in any language: it reads the inputs of each step, and writes the outputs.
+    #[command(after_help = node::STEP_HELP)]
+    Step(Step),
     /// One node of a running graph; the supervisor starts it.
     #[command(hide = true)]
     Node(Node),
+    /// Why a loop shakes at this moment; a run that is watched starts it.
+    #[command(hide = true)]
+    WhyNow(WhyNow),
     /// The master of a proof; the supervisor starts it.
     #[command(hide = true)]
     SealedMaster(SealedMaster),

@@ -157,6 +157,8 @@ impl Surveyed {
         match &self.analysis {
             _ if failed => code::BAD_INPUT,
             Some(found) if !found.changes.is_empty() || !found.together.is_empty() || !found.odd.is_empty() => code::NEGATIVE,
+            // Where every recording is left out nothing is known.
+            Some(found) if counted(found) == 0 => code::CANNOT_TELL,
             _ => 0,
         }
     }
@@ -166,7 +168,12 @@ impl Surveyed {
         if let Some(done) = &self.done {
             let Progress { done: answered, kept, all } = done.progress;
             let shard = if self.shard.1 > 1 { format!(" of shard {} of {}", self.shard.0, self.shard.1) } else { String::new() };
-            lines.push(format!("fleet     {answered} of {all} recordings{shard} answered, {kept} of them before"));
+            let without = match done.failed.len() {
+                0 => String::new(),
+                failed if failed == answered => ", none of them with an answer".to_string(),
+                failed => format!(", {failed} of them without an answer"),
+            };
+            lines.push(format!("fleet     {answered} of {all} recordings{shard} done{without}, {kept} of them before"));
             for (name, why) in done.failed.iter().take(LISTED) {
                 lines.push(format!("no answer {name}: {why}"));
             }
@@ -194,11 +201,18 @@ impl Surveyed {
         said("odd", found.odd.iter().map(|odd| odd.sentence.as_str()).collect());
         said("left out", found.left_out.iter().map(|left| left.recording.as_str()).collect());
         said("note", found.notes.iter().map(String::as_str).collect());
-        if self.code() == 0 {
-            lines.push(format!("answer    nothing changed on {} units in {} recordings", found.units, found.recordings));
+        match self.code() {
+            0 => lines.push(format!("answer    nothing changed on {} units in {} recordings that count", found.units, counted(found))),
+            code::CANNOT_TELL => lines.push("answer    not known: every recording is left out".to_string()),
+            _ => {}
         }
         lines.join("\n") + "\n"
     }
+}
+
+/// Recordings that are not left out.
+fn counted(found: &Analysis) -> usize {
+    found.recordings.saturating_sub(found.left_out.len())
 }
 
 /// Time that is left, by the recordings that were not kept from before.

@@ -2,7 +2,7 @@
 
 use crate::failure::{Failure, code};
 use crate::{cli, output, progress};
-use backdrive_fleet::gate::{Bounds, Gated, Outcome, gate as compared, junit};
+use backdrive_fleet::gate::{Bounds, Check, Gated, Outcome, gate as compared, junit};
 
 /// Compares, prints what changed, and ends with 1 where it matters.
 pub fn gate(options: &cli::Gate) -> Result<u8, Failure> {
@@ -41,6 +41,8 @@ fn text(found: &Gated) -> String {
     if !open.is_empty() {
         lines.push(format!("not judged, for the old recordings do not determine them to within their bounds: {}", open.join(", ")));
     }
+    let is_stated = |check: &&Check| check.place == "loop" && check.sentence.starts_with("loop: the graphs state");
+    lines.extend(found.with(Outcome::Passed).filter(is_stated).map(|check| format!("stated    {}", check.sentence)));
     lines.extend(found.notes.iter().map(|note| format!("note      {note}")));
     let passed = found.with(Outcome::Passed).count();
     lines.push(match ended(found) {

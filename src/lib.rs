@@ -10,6 +10,7 @@ pub mod caller;
 mod cli;
 mod columns;
 pub mod compare;
+mod device;
 pub mod diagnose;
 mod doctor;
 pub mod export;
@@ -21,6 +22,7 @@ mod graph;
 mod init;
 pub mod inspect;
 mod interrupt;
+mod live;
 mod model;
 pub mod model_run;
 mod node;
@@ -38,6 +40,7 @@ pub mod simulate;
 pub mod stability;
 mod test_bench;
 pub mod why;
+mod why_now;
 
 use cli::{Cli, Command};
 use std::process::ExitCode;
@@ -61,6 +64,7 @@ pub fn main() -> ExitCode {
     end_with_the_reader(&command);
     let result = match &command {
         Command::Node(options) => return node::node(options),
+        Command::Step(options) => return node::step(options),
         Command::SealedMaster(options) => return prove::sealed_master(options),
         command => call::dispatch(command),
     };
@@ -76,7 +80,13 @@ fn end_with_the_reader(command: &Command) {
     use nix::sys::signal::{SigHandler, Signal, signal};
     if !matches!(
         command,
-        Command::Run(_) | Command::Prove(_) | Command::Node(_) | Command::SealedMaster(_) | Command::Bag(cli::Bag::Play { .. })
+        Command::Run(_)
+            | Command::Live(_)
+            | Command::Prove(_)
+            | Command::Node(_)
+            | Command::Step(_)
+            | Command::SealedMaster(_)
+            | Command::Bag(cli::Bag::Play { .. })
     ) {
         // SAFETY: the default action replaces none of ours.
         let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };

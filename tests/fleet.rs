@@ -1,6 +1,7 @@
 //! `backdrive fleet` and `backdrive gate` as processes: shards and threads give the same bytes, a kill loses nothing, a change is named, and a change of
 //! the device fails the gate.
 
+mod changed;
 mod system;
 
 use backdrive_fleet::simulated::{Arm, JOINTS, RATE, Truth, random, unit};
@@ -114,6 +115,69 @@ fn the_gate_fails_where_a_joint_changed_and_writes_junit() {
     place.write("wrong.toml", "dri = 0.6\n");
     let done = place.backdrive(&["gate", "old", "new", "--model", &model, "--bounds", "wrong.toml"]);
     assert!(done.code == Some(3) && done.stderr.contains("wrong.toml") && done.stderr.contains("dri"), "{done:?}");
+}
+
+#[test]
+fn the_gate_names_what_changed_in_a_loop_and_what_that_does_to_its_limit() {
+    let place = Place::new();
+    let graph = |name: &str, changes: &[(&str, &str)]| {
+        let mut text = system::graph_text("launch/contact.toml");
+        for (from, to) in changes {
+            assert!(text.contains(from), "{from}");
+            text = text.replacen(from, to, 1);
+        }
+        place.write(&format!("{name}.toml"), &text);
+        let bag = format!("{name}.mcap");
+        let done = place.backdrive(&["run", &format!("{name}.toml"), "--transport", "inproc", "--canceller", "none", "--bag", &bag]);
+        assert!([Some(0), Some(1)].contains(&done.code), "{done:?}");
+        bag
+    };
+    let old = graph("old", &[]);
+    let gated = |new: &str| place.run_for(&["gate", &old, new, "--json"], Duration::from_secs(100));
+    let check = |done: &system::Ended, quantity: &str| {
+        let all = done.json();
+        let found = all["checks"].as_array().unwrap().iter().find(|check| check["quantity"] == quantity);
+        found.unwrap_or_else(|| panic!("no {quantity}: {done:?}")).clone()
+    };
+    let same = gated(&graph("same", &[("seed = 1", "seed = 2")]));
+    assert_eq!(same.code, Some(0), "{same:?}");
+    // Twice the gain: the limit stays, and half of the margin is gone.
+    let gain = gated(&graph("gain", &[("lambda = 0.3", "lambda = 0.6")]));
+    assert_eq!((gain.code, check(&gain, "gains.lambda")["kind"].as_str()), (Some(1), Some("gain")), "{gain:?}");
+    assert!(check(&gain, "gain_margin")["sentence"].as_str().unwrap().contains("changed: gains.lambda 0.3 -> 0.6"), "{gain:?}");
+    assert_eq!(check(&gain, "critical_gain")["outcome"], "passed", "{gain:?}");
+    // Five milliseconds more on the way back: a rate or a delay, and the limit falls.
+    let delay = gated(&graph("delay", &[("delay = 1 ", "delay = 26 ")]));
+    let key = "slave.measured to scaling.contact.delay";
+    assert_eq!((delay.code, check(&delay, key)["kind"].as_str()), (Some(1), Some("rate")), "{delay:?}");
+    let limit = check(&delay, "critical_gain");
+    assert!(limit["outcome"] == "failed" && limit["sentence"].as_str().unwrap().contains(&format!("changed: {key} 1 -> 26")), "{delay:?}");
+    // A softer wall is a parameter of the slave's environment.
+    let wall = std::fs::read_to_string(file("plant/environments/stiff-wall.toml")).unwrap();
+    let number = wall.lines().find_map(|line| line.trim().strip_prefix("stiffness = ")).unwrap().split('#').next().unwrap().trim();
+    place.write("softer-wall.toml", &wall.replacen(&format!("stiffness = {number}"), "stiffness = 3000.0", 1));
+    let stated = format!("\"{}\"", file("plant/environments/stiff-wall.toml"));
+    let softer = gated(&graph("wall", &[(&stated, "\"softer-wall.toml\"")]));
+    let found: Vec<String> = softer.json()["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|c| c["kind"] == "parameter")
+        .map(|c| c["quantity"].to_string())
+        .collect();
+    assert!(found.iter().any(|key| key.contains("slave.environment") && key.contains("stiffness")), "{softer:?}");
+    // What nobody stated, because the bag's graph has the old delay: found by running each node alone.
+    let mut bag = changed::Bag::load(&place.path("delay.mcap"));
+    bag.graph(|text| text.replacen("delay = 26", "delay = 1", 1));
+    bag.save(&place.path("hidden.mcap"));
+    let hidden = gated("hidden.mcap");
+    assert_eq!(hidden.code, Some(1), "{hidden:?}");
+    let of = hidden.json()["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .any(|c| c["kind"] == "rate" && c["outcome"] == "failed" && c["sentence"].to_string().contains("later than the graph states"));
+    assert!(of, "{hidden:?}");
 }
 
 #[test]

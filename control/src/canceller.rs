@@ -4,7 +4,7 @@ use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use crate::freshness::Freshness;
 use crate::hand::{HandBank, Scheduled};
-use crate::scaling::{GainPlan, GainsInForce};
+use crate::scaling::{GainPlan, GainsInForce, Ramp};
 use backdrive_msgs::{Gains, MAX_AXES, Sample};
 
 /// Input `measured` (position; effort = applied force); outputs `motion` (position without the predicted induced motion,
@@ -19,6 +19,10 @@ pub struct Canceller {
     force: [f64; MAX_AXES],
     started: bool,
     trusted: bool,
+    /// Share of the prediction that is subtracted: 1, or on its way to 0 or back.
+    share: Ramp,
+    /// A switch that is to take place at the next step: whether on, and its ramp, s.
+    switch: Option<(bool, f64)>,
 }
 
 impl Canceller {
@@ -34,6 +38,8 @@ impl Canceller {
             force: [0.0; MAX_AXES],
             started: false,
             trusted: true,
+            share: Ramp::new(1.0),
+            switch: None,
         }
     }
 
@@ -47,6 +53,11 @@ impl Canceller {
 
 impl Core for Canceller {
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+        if let Some((on, ramp_s)) = self.switch.take() {
+            self.share.aim(f64::from(u8::from(on)), ramp_s, tick.period_s);
+            events.push(if on { "canceller_switched_on" } else { "canceller_switched_off" }, ramp_s, 1);
+        }
+        let share = self.share.step();
         let fresh = self.measured.new_sample(&inputs[0], |s| s.position[0]).copied();
         let mut induced = [0.0; MAX_AXES];
         if let Some(model) = &mut self.model {
@@ -87,8 +98,10 @@ impl Core for Canceller {
         if let Some(measured) = fresh {
             let (motion, estimate) = outputs.split_at_mut(1);
             for axis in 0..measured.len() {
-                motion[0].position[axis] = measured.position[axis] - induced[axis];
-                estimate[0].position[axis] = induced[axis];
+                // The model runs on while it is left out, so that it is right when it comes back.
+                let subtracted = if share < 1.0 { share * induced[axis] } else { induced[axis] };
+                motion[0].position[axis] = measured.position[axis] - subtracted;
+                estimate[0].position[axis] = subtracted;
                 self.force[axis] = if measured.effort[axis].is_nan() { 0.0 } else { measured.effort[axis] };
             }
         }
@@ -98,6 +111,10 @@ impl Core for Canceller {
         if let Some((_, in_force)) = &mut self.scheduled {
             in_force.set(gains);
         }
+    }
+
+    fn set_active(&mut self, active: bool, ramp_s: f64) {
+        self.switch = Some((active, ramp_s));
     }
 }
 

@@ -1,7 +1,7 @@
 //! What every core is: a function of (time, inputs, its state).
 
 use crate::live_margin::MarginEstimate;
-use backdrive_msgs::{Gains, Sample};
+use backdrive_msgs::{Gains, MAX_AXES, Sample};
 
 /// The step that is being done.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,8 +71,26 @@ pub trait Core: Send {
     /// axes and is sent as `step` leaves it (the runner fills step, sequence, stamp and source).
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events);
 
+    /// Called once in the node's own process before the first step, where all else is ready: a device is opened and checked here. Gives notes for a
+    /// person.
+    ///
+    /// # Errors
+    /// One sentence, where the run cannot begin.
+    fn begin(&mut self) -> Result<Vec<String>, String> {
+        Ok(Vec::new())
+    }
+
+    /// The values of a list of named numbers of its node, such as the rate of a device's bus; asked about ten times a second. `list` counts the
+    /// node's lists from 0.
+    fn report(&self, _list: usize) -> Option<[f64; MAX_AXES]> {
+        None
+    }
+
     /// New gains are wanted from now on. Most cores have none.
     fn set_gains(&mut self, _gains: &Gains) {}
+
+    /// Whether the core is to take part in the loop from now on, faded over `ramp_s` seconds. Only a canceller can be left out of a loop that runs.
+    fn set_active(&mut self, _active: bool, _ramp_s: f64) {}
 
     /// The gains now in force, if the core has any: (mu, lambda).
     fn gains(&self) -> Option<(f64, f64)> {

@@ -37,7 +37,7 @@ impl Freshness {
 /// Steps without a new sample that a node bridges: at the next one the input is stale, `stale_after_s` after its last sample.
 ///
 /// A single missing step is always bridged, because a living sender may be late by one: at low rates `stale_after_s` is two periods at least.
-pub(crate) fn bridged_steps(stale_after_s: f64, period_s: f64) -> u64 {
+pub fn bridged_steps(stale_after_s: f64, period_s: f64) -> u64 {
     // A quotient just below a whole number is that number.
     let steps = (stale_after_s / period_s + 1e-6).floor() as u64;
     steps.max(2) - 1

@@ -10,7 +10,7 @@ pub mod device;
 pub mod dynamometer;
 pub mod engine;
 pub mod exciter;
-mod freshness;
+pub mod freshness;
 pub mod guard;
 pub mod hand;
 pub mod live_margin;

@@ -1,6 +1,7 @@
 //! The answer to one recording: a row for each joint, and the verdict.
 
 mod device;
+mod fit;
 mod loops;
 
 use crate::answered::Answered;

@@ -26,8 +26,15 @@ pub const INERTIA: Parameter = Parameter { name: "inertia", words: "inertia", un
 /// Time by which the recorded torque lags that of the links.
 pub const LAG: Parameter = Parameter { name: "lag", words: "lag of the torque", unit: "s", servo_unit: "s" };
 
-/// All of them, in the order in which the regression takes them up.
-pub const ALL: [Parameter; 6] = [DRY, VISCOUS, CONSTANT, GAIN, INERTIA, LAG];
+/// Of a position servo: the part of its lag by which it answers late, beside what inertia and damping take.
+pub const DELAY: Parameter = Parameter { name: "delay", words: "delay", unit: "s", servo_unit: "s" };
+/// Of a position servo: width of the hysteresis between command and position, of play, dry friction and dead band together.
+pub const LOST_MOTION: Parameter = Parameter { name: "lost_motion", words: "lost motion at reversals", unit: "rad", servo_unit: "rad" };
+
+/// Those of the regression, in the order in which it takes them up.
+pub const REGRESSED: [Parameter; 6] = [DRY, VISCOUS, CONSTANT, GAIN, INERTIA, LAG];
+/// All of them.
+pub const ALL: [Parameter; 8] = [DRY, VISCOUS, CONSTANT, GAIN, INERTIA, LAG, DELAY, LOST_MOTION];
 
 impl Parameter {
     /// By its column.

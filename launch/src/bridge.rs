@@ -4,10 +4,11 @@
 //! nodes on other hosts speak is also taken from ROS 2 into shared memory. The nodes here then need not know where the others are. Only what is tagged by
 //! the run's own hosts is taken.
 
+use crate::alive::{find, lives};
 use crate::asked::{Asked, network};
 use crate::carry_error::CarryError;
 use crate::join::read_graph;
-use crate::{Place, RunHome, RunPaths, Wire};
+use crate::{Place, Wire};
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_nodes::build::{credit_listeners, credit_topic, listeners_on, topics};
@@ -119,22 +120,6 @@ pub fn bridge(options: &Options, stop: &AtomicBool, note: &(dyn Fn(&str) + Sync)
     .map_err(CarryError::machine)?;
     drop(courier);
     Ok(Bridged { run: paths.id().to_string(), out, back })
-}
-
-/// The run that is named, by the beginning of its name, or the only one that lives.
-fn find(named: Option<&str>) -> Result<RunPaths, CarryError> {
-    let home = RunHome::system();
-    let alive: Vec<String> = home.alive().into_iter().filter(|id| named.is_none_or(|n| id.starts_with(n))).collect();
-    match (&alive[..], named) {
-        ([one], _) => RunPaths::open(&home.dir().join(one)).map_err(CarryError::from),
-        ([], None) => Err(CarryError::input(format!("no run is alive in {}; start one with `backdrive run`", home.dir().display()))),
-        ([], Some(named)) => Err(CarryError::input(format!("no living run's name begins with `{named}`"))),
-        (several, _) => Err(CarryError::input(format!("several runs are alive, name one: {}", several.join(", ")))),
-    }
-}
-
-fn lives(paths: &RunPaths) -> bool {
-    paths.root().parent().is_some_and(|home| RunHome::at(home).alive().iter().any(|id| id == paths.id()))
 }
 
 /// What goes out and what comes in. Over ROS 2 the bridge stands for all listeners of this host; in shared memory it is one.

@@ -33,11 +33,17 @@ where
     let arguments: Vec<String> = std::env::args().collect();
     let after = |flag: &str| arguments.iter().position(|a| a == flag).and_then(|i| arguments.get(i + 1)).cloned();
     match (after("--run"), after("--name")) {
-        (Some(run), Some(name)) => run_node(Path::new(&run), &name, |graph, node| {
-            build::plan_with(graph, &node.name, cores(graph, node)?).map_err(|e| e.to_string())
-        }),
+        (Some(run), Some(name)) => join_run(Path::new(&run), &name, cores),
         _ => fail("this program is a node of a graph: name it as `command` of a node, and `backdrive run` starts it".to_string(), 2),
     }
+}
+
+/// Joins a run as a node whose cores the caller brings.
+pub(crate) fn join_run<F>(run: &Path, name: &str, cores: F) -> ExitCode
+where
+    F: FnOnce(&Graph, &Node) -> Result<Vec<Box<dyn Core>>, String>,
+{
+    run_node(run, name, |graph, node| build::plan_with(graph, &node.name, cores(graph, node)?).map_err(|e| e.to_string()))
 }
 
 /// Joins a run as one of our own nodes.
@@ -171,7 +177,8 @@ fn host() -> String {
 }
 
 /// Reports why the node cannot begin, to the supervisor, or to the user who started it by hand.
-fn fail(error: String, code: u8) -> ExitCode {
+/// Reports to the supervisor why this node ends, with the exit code of the command line; returns that code.
+pub(crate) fn fail(error: String, code: u8) -> ExitCode {
     let line = serde_json::to_string(&FromNode::Failed { error: error.clone(), code });
     // A supervisor that is gone hears nothing, and that is no second error.
     let _ = writeln!(std::io::stdout(), "{}", line.unwrap_or_default());

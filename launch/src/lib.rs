@@ -8,6 +8,7 @@
 //! - `domain_claim`: which run of a machine speaks in a ROS domain; `session`: who a run is on the network; `secret`: what its hosts share
 //! - `hosts`: a run on several hosts starts together; `place`: where its nodes meet
 //! - `asked`: from options and the environment to where a run meets; `bridge`: a local run seen over ROS 2; `play`: a bag sent again
+//! - `asks`: what may be asked of a run from outside; `alive`: which runs there are
 //! - `status`, `screen`: what a person sees meanwhile
 //! - `report`: what is known afterwards
 //!
@@ -18,7 +19,9 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod alive;
 pub mod asked;
+pub mod asks;
 pub mod bridge;
 mod carry_error;
 mod child;
@@ -45,6 +48,7 @@ mod session;
 mod signals;
 mod slot;
 mod status;
+pub mod step_program;
 mod supervise;
 mod sweep;
 mod tell;

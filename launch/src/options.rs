@@ -1,5 +1,6 @@
 //! How a run is supervised, and what may be asked of it.
 
+use crate::paths::RunPaths;
 use crate::rundir::RunHome;
 use crate::screen::Display;
 use std::time::Duration;
@@ -32,6 +33,8 @@ pub struct SuperviseOptions {
     pub sweep_limit: Duration,
     /// What may be asked of the run while it lasts.
     pub commands: Option<mpsc::Receiver<Command>>,
+    /// Who wants to know where the run is, as soon as it has a place and before its nodes meet.
+    pub created: Option<std::sync::mpsc::Sender<RunPaths>>,
 }
 
 impl Default for SuperviseOptions {
@@ -48,6 +51,7 @@ impl Default for SuperviseOptions {
             status_every: Duration::from_secs(5),
             sweep_limit: Duration::from_secs(1),
             commands: None,
+            created: None,
         }
     }
 }

@@ -51,6 +51,11 @@ impl RunPaths {
         self.root.join(IDENTITY)
     }
 
+    /// Where the supervisor can be asked for something while the run lasts.
+    pub fn asks(&self) -> PathBuf {
+        self.root.join(ASKS)
+    }
+
     /// What the names of the run's files in shared memory begin with.
     pub fn prefix(&self) -> String {
         prefix_of(&self.id)
@@ -74,6 +79,8 @@ pub(crate) fn is_id(name: &str) -> bool {
 pub(crate) const GRAPH: &str = "graph.toml";
 
 pub(crate) const PLACE: &str = "place.json";
+
+pub(crate) const ASKS: &str = "asks.sock";
 
 pub(crate) const IDENTITY: &str = "identity.json";
 

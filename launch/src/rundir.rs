@@ -8,6 +8,7 @@
 //!     identity.json      the key of its messages on the network, and those of the other hosts; for its user only
 //!     supervisor.lock    locked for as long as the supervisor lives
 //!     processes.lock     locked, shared, by each process of the run
+//!     asks.sock          where the supervisor can be asked for something while it lasts
 //!     pids               who was started, for the case that the supervisor is killed
 //!     middleware/        the transport's files
 //! /dev/shm/bd<id>_*      shared memory

@@ -77,5 +77,11 @@ pub async fn supervise_plan(mut plan: Plan, mut options: SuperviseOptions) -> Re
     let session = Session::begin(&plan, directory.paths())?;
     directory.tell_identity(&session.known)?;
     let commands = options.commands.take();
-    Supervisor::new(plan, options, directory, screen, session).run(signals, commands).await
+    let asks =
+        crate::asks::listen(directory.paths()).map_err(|e| screen.line(format!("warning: nothing can be asked of this run: {e}"))).ok();
+    if let Some(created) = options.created.take() {
+        // Who wanted to know may be gone.
+        let _ = created.send(directory.paths().clone());
+    }
+    Supervisor::new(plan, options, directory, screen, session).run(signals, commands, asks).await
 }

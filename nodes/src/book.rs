@@ -25,6 +25,11 @@ pub(crate) struct Book {
     margin_due: u64,
 }
 
+/// Stamp of what is made at `step` in lockstep: simulated ns since the start.
+pub(crate) fn simulated_ns(step: u64, rate_hz: f64) -> i64 {
+    (step as f64 * 1e9 / rate_hz).round() as i64
+}
+
 /// The parts of a status that the node must look up.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Health {
@@ -54,7 +59,7 @@ impl Book {
 
     /// Stamp of what is made at `step` in lockstep: simulated ns since the start.
     pub fn simulated_ns(&self, step: u64) -> i64 {
-        (step as f64 * 1e9 / self.rate_hz).round() as i64
+        simulated_ns(step, self.rate_hz)
     }
 
     /// An event with its own text.

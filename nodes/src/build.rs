@@ -25,8 +25,11 @@ use backdrive_control::scaling::{Backward, Forward};
 use backdrive_control::shaft::ShaftNode;
 use backdrive_control::slave::Slave;
 use backdrive_control::speed_control::SpeedControlNode;
+use backdrive_devices::core::{BUS_NUMBERS, DeviceCore};
+use backdrive_devices::side::Side;
+use backdrive_devices::start::Source;
 use backdrive_msgs::topic::{Kind, Topic};
-use backdrive_msgs::{Gains, Sample, source_id};
+use backdrive_msgs::{Gains, MAX_AXES, Sample, source_id};
 use backdrive_plant::linear::Operating;
 
 /// Oscillation of the reflected force that the guard leaves alone, N or N m: about what a finger does not feel.
@@ -62,6 +65,18 @@ pub enum BuildError {
         node: String,
         /// What is wrong.
         error: DeviceError,
+    },
+    /// A real device stands in a recording.
+    #[error(
+        "node \"{node}\" is the real device \"{device}\", which cannot be run from a recording; give a model of it: --{kind} MODEL.toml"
+    )]
+    Recorded {
+        /// The node.
+        node: String,
+        /// Its device.
+        device: String,
+        /// `master` or `slave`.
+        kind: &'static str,
     },
     /// A program brings the wrong number of cores.
     #[error("node \"{node}\": kind {kind} has {expected} stages, the program brings {given} cores")]
@@ -117,6 +132,9 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
         }
         side("events", Kind::Event);
         side("status", Kind::Status);
+        for (topic, axes) in lists(node) {
+            topics.push(GraphTopic { topic, publisher: node.name.clone(), axes, woken: 0, listeners: recorded });
+        }
     }
     // A lockstep bag holds nothing that the machines decide.
     for host in graph.hosts.iter().filter(|_| graph.timing.clock == Clock::Realtime) {
@@ -124,6 +142,15 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
         topics.push(GraphTopic { topic, publisher, axes: Vec::new(), woken: 0, listeners: recorded });
     }
     topics
+}
+
+/// Lists of named numbers that a node with a real device publishes beside its samples: topic, and the names.
+fn lists(node: &Node) -> Vec<(Topic, Vec<String>)> {
+    let Some(device) = &node.device else { return Vec::new() };
+    let of = |part: &str| Topic { name: format!("/{}/{part}", node.name), kind: Kind::Sample };
+    let joints = device.file.axis_names();
+    let bus = BUS_NUMBERS.iter().map(|name| (*name).to_string()).collect();
+    vec![(of("bus"), bus), (of("current"), joints.clone()), (of("temperature"), joints)]
 }
 
 /// Whether nothing that it hears holds a node back.
@@ -176,6 +203,15 @@ pub fn plan(graph: &Graph, name: &str) -> Result<NodePlan, BuildError> {
 /// There is no such node, or its device does not work.
 pub fn cores_of(graph: &Graph, name: &str) -> Result<Vec<Box<dyn Core>>, BuildError> {
     let node = graph.node(name).ok_or_else(|| BuildError::NoSuchNode(name.to_string()))?;
+    if let Some(device) = &node.device {
+        let side = if node.kind == NodeKind::Master { Side::Master } else { Side::Slave };
+        if device.is_recorded {
+            let (node, kind) = (node.name.clone(), node.kind.name());
+            return Err(BuildError::Recorded { node, device: device.file.name.clone(), kind });
+        }
+        let source = device.emulator.clone().map_or(Source::Port, Source::Emulator);
+        return Ok(vec![Box::new(DeviceCore::new(device.file.clone(), side, source, graph.stale_after_s, graph.period_s()))]);
+    }
     cores(graph, node).map_err(|error| BuildError::Device { node: node.name.clone(), error })
 }
 
@@ -225,6 +261,7 @@ pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result
         gains_in: None,
         gains_out: node.kind.closes_loop().then(|| side("gains", Kind::Gains)),
         margin_out: (node.kind == NodeKind::Scaling).then(|| side("margin", Kind::Margin)),
+        lists: lists(node).into_iter().map(|(topic, names)| (topic, names.len())).collect(),
     })
 }
 
@@ -339,8 +376,20 @@ impl Core for Wired {
         self.core.step(tick, &self.ports, outputs, events);
     }
 
+    fn begin(&mut self) -> Result<Vec<String>, String> {
+        self.core.begin()
+    }
+
+    fn report(&self, list: usize) -> Option<[f64; MAX_AXES]> {
+        self.core.report(list)
+    }
+
     fn set_gains(&mut self, gains: &Gains) {
         self.core.set_gains(gains);
+    }
+
+    fn set_active(&mut self, active: bool, ramp_s: f64) {
+        self.core.set_active(active, ramp_s);
     }
 
     fn gains(&self) -> Option<(f64, f64)> {

@@ -51,6 +51,7 @@ pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn T
     let timing = timing.clone();
     line.supervised(|line| {
         let mut runner = Runner::together(plans, &timing, transport, options.run)?;
+        runner.begin(&mut |told| line.tell(told))?;
         let Some(start) = line.meet(|| runner.check_alone().map(|()| runner.missing()))? else {
             return Ok(NodeStatus::default());
         };
@@ -225,6 +226,8 @@ fn read_lines(control: &Control, start: &SyncSender<Start>) {
             }
             Ok(ToNode::Stop) => control.stop(),
             Ok(ToNode::Gains { mu, lambda, ramp_s }) => control.set_gains(mu, lambda, ramp_s),
+            Ok(ToNode::Canceller { on, ramp_s }) => control.switch_canceller(on, ramp_s),
+            Ok(ToNode::Note(note)) => control.note(note),
             Err(e) => {
                 let _ = writeln!(std::io::stderr(), "not understood from the supervisor: {e}: {line}");
             }

@@ -33,6 +33,28 @@ pub enum ToNode {
         /// Ramp, s.
         ramp_s: f64,
     },
+    /// Leave the canceller out of the loop, or take it back.
+    Canceller {
+        /// Whether it subtracts.
+        on: bool,
+        /// Time over which it fades, s.
+        ramp_s: f64,
+    },
+    /// Publish an event that is not the node's own, such as a remark of somebody who watches: so the recorder has it.
+    Note(Note),
+}
+
+/// An event that a node publishes for somebody else.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Note {
+    /// 0 info, 1 warning, 2 error.
+    pub severity: u32,
+    /// Machine-readable name, at most 32 bytes.
+    pub kind: String,
+    /// A sentence; what is beyond 128 bytes is cut off.
+    pub text: String,
+    /// A number that belongs to it.
+    pub value: Option<f64>,
 }
 
 /// From a node to the supervisor.

@@ -7,8 +7,17 @@ use std::fmt::Write;
 /// Kind, the text before the number, and after it. Without a second part the number is not shown.
 const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("canceller_off", "the canceller's prediction is not finite: it no longer subtracts, since", Some("s")),
+    ("canceller_switched_off", "the canceller is left out of the loop, faded out over", Some("s")),
+    ("canceller_switched_on", "the canceller is back in the loop, faded in over", Some("s")),
     ("connection_broken", "a message could not be sent or received", None),
     ("controller_off", "the controller's force is not finite: it commands none any more, since", Some("s")),
+    ("device_answers", "all joints of the device answer again", None),
+    ("device_current_limit", "the current of a joint is beyond its limit, so the device is released:", Some("A")),
+    ("device_force_back", "the device's torque is back", None),
+    ("device_force_stale", "no force or no reading has come for", Some("steps: the device's torque decays to zero")),
+    ("device_gone", "the device's port is gone: unplugged? Steps without a reading:", Some("")),
+    ("device_silent", "joints of the device do not answer; steps without a whole reading:", Some("")),
+    ("device_too_hot", "a joint is too hot, so the device is released:", Some("degrees Celsius")),
     ("drive_back", "a controller's forces arrive again, after", Some("steps without any")),
     ("drive_stale", "no force has come for", Some("steps: the slave's motor force decays to zero")),
     ("force_back", "forces arrive again, after", Some("steps without any")),

@@ -97,6 +97,8 @@ pub struct NodePlan {
     pub gains_out: Option<Topic>,
     /// Where the loop's margin is published ten times a second, if a stage knows of it.
     pub margin_out: Option<Topic>,
+    /// Lists of named numbers that the first stage's core reports ten times a second: topic, and how many numbers.
+    pub lists: Vec<(Topic, usize)>,
 }
 
 /// What all nodes of a graph share.

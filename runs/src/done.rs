@@ -1,6 +1,6 @@
 //! What a run gave.
 
-use backdrive_launch::{Cause, RunReport};
+use backdrive_launch::{Cause, RunEvent, RunReport};
 use backdrive_stability::summary::Summary;
 use std::path::PathBuf;
 
@@ -39,6 +39,14 @@ pub enum Fault {
     Lost,
 }
 
+/// Events after which a device takes no part in its run any more.
+const DEVICE_LOST: [&str; 3] = ["device_gone", "device_too_hot", "device_current_limit"];
+
+/// The first event by which a run lost one of its devices.
+pub(crate) fn lost_device(report: &RunReport) -> Option<&RunEvent> {
+    report.events.iter().find(|event| DEVICE_LOST.contains(&event.kind.as_str()))
+}
+
 impl Done {
     /// What went wrong, if anything did.
     pub fn fault(&self) -> Option<Fault> {
@@ -49,6 +57,8 @@ impl Done {
                 Cause::Stranger { .. } => return Some(Fault::Stranger),
                 Cause::Stopped { .. } => return Some(Fault::Stopped),
                 Cause::Completed if !report.orderly() => return Some(Fault::Node),
+                // A run whose device went away is no success, whatever the rest of it did.
+                Cause::Completed if lost_device(report).is_some() => return Some(Fault::Node),
                 Cause::Completed => {}
             }
         }
@@ -59,6 +69,8 @@ impl Done {
     pub fn ended(&self) -> Option<String> {
         let cause = self.report.as_ref().map(|report| &report.cause).filter(|cause| **cause != Cause::Completed);
         let cause = cause.map(|cause| format!("ended    {cause}"));
+        let device = self.report.as_ref().and_then(lost_device);
+        let cause = cause.or_else(|| device.map(|event| format!("device   {}: {}", event.node, event.text)));
         cause.or_else(|| self.unreadable.as_ref().map(|why| format!("UNREADABLE {why}")))
     }
 }

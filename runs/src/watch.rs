@@ -1,6 +1,8 @@
 //! Who watches a run.
 
+use backdrive_launch::RunPaths;
 use std::any::Any;
+use std::sync::mpsc::Sender;
 
 /// What a run reports while it lasts.
 pub trait Watch {
@@ -15,6 +17,11 @@ pub trait Watch {
     /// Program and first arguments of a node's process; empty for the program of this process.
     fn node_command(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// Who is to hear where a run of processes is, as soon as it has a place and before its nodes meet.
+    fn created(&self) -> Option<Sender<RunPaths>> {
+        None
     }
 
     /// `done` of `all` steps of the run of this title are done. The run has ended where both are equal.

@@ -1,6 +1,6 @@
 //! How the nodes of a run are carried out: in this process, or each in its own.
 
-use crate::done::Done;
+use crate::done::{Done, lost_device};
 use crate::error::RunError;
 use crate::watch::Watch;
 use backdrive_bags::{Completeness, Reader, Recorder, RecorderOptions, check_target};
@@ -108,7 +108,7 @@ fn run_processes(graph: &Graph, place: &Place, watch: &dyn Watch) -> Result<Done
     ready(graph, place.host.as_deref())?;
     too_many_poll(graph, place.host.as_deref(), watch);
     let courier = Courier::start(&place.network).map_err(RunError::machine)?;
-    let mut options = SuperviseOptions { node_command: watch.node_command(), ..SuperviseOptions::default() };
+    let mut options = SuperviseOptions { node_command: watch.node_command(), created: watch.created(), ..SuperviseOptions::default() };
     if place.host.is_some() {
         options.ready_timeout = HOSTS_TIMEOUT;
     }
@@ -150,7 +150,7 @@ fn whole(bag: &Path) -> (bool, Option<String>) {
 /// Why a run must not be called stable, whatever its signals look like.
 fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
     let died = matches!(report.cause, Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. });
-    if died || !report.deaths.is_empty() {
+    if died || !report.deaths.is_empty() || lost_device(report).is_some() {
         return Some(Unjudged::NodeDied);
     }
     (lost > 0).then_some(Unjudged::Lost { messages: lost })

@@ -44,10 +44,35 @@ pub fn is_servo(set: &RecordingSet) -> bool {
         return set.joints.iter().any(|j| j.has_command) && set.joints.iter().all(|j| !j.has_torque);
     }
     let Some(first) = set.fit.iter().chain(&set.held_out).next() else { return false };
+    if set.is_bag(first) && !device_joints(set, first).is_empty() {
+        return true;
+    }
     let Ok(headings) = names_in(set, first) else { return false };
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let ends = |ends: &[&str]| plain.iter().any(|h| ends.iter().any(|e| h.ends_with(e)));
     !pairs(&plain).is_empty() && !ends(&[".torque", ".effort", "_torque", "_effort", ".tau"])
+}
+
+/// Joints of the devices of a run that took positions: name, topic of the command, topic of the position, and index of the axis. A device is known by
+/// the topic on which it reports its bus.
+fn device_joints(set: &RecordingSet, file: &str) -> Vec<(String, String, String, usize)> {
+    let Ok(reader) = Reader::open_begun(&set.path_of(file)) else { return Vec::new() };
+    let has = |name: &str| reader.topics().iter().any(|t| t.name == name);
+    let mut found: Vec<(String, String, String, usize)> = Vec::new();
+    for measured in reader.topics() {
+        let Some(node) = measured.name.strip_suffix("/measured_js") else { continue };
+        let command = format!("{node}/servo_jp");
+        if !has(&format!("{node}/bus")) || !has(&command) {
+            continue;
+        }
+        for (axis, name) in measured.axes.iter().enumerate() {
+            // Two arms may have joints of one name.
+            let taken = found.iter().any(|(other, ..)| other == name);
+            let name = if taken { format!("{}_{name}", node.trim_start_matches('/')) } else { name.clone() };
+            found.push((name, command.clone(), measured.name.clone(), axis));
+        }
+    }
+    found
 }
 
 /// Headings of a table, or of what was a table before it became a bag.
@@ -161,9 +186,26 @@ fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
         return Ok(set.joints.clone());
     }
     let first = set.fit.iter().chain(&set.held_out).next().cloned().unwrap_or_default();
+    let mut columns = Columns::new();
+    if set.is_bag(&first) {
+        let field = |axis: usize| format!("position[{axis}]");
+        let joints: Vec<JointColumns> = device_joints(set, &first)
+            .into_iter()
+            .map(|(name, command, position, axis)| {
+                let joint = JointColumns::of_servo(&name, &command, &position, &mut Columns::new());
+                for (signal, topic) in [(joint.command(), command), (joint.position(), position)] {
+                    columns.push((signal, ColumnRule::of(Source::Topic { topic, field: field(axis) })));
+                }
+                joint
+            })
+            .collect();
+        if !joints.is_empty() {
+            set.columns.extend(columns);
+            return Ok(joints);
+        }
+    }
     let headings = names_in(set, &first)?;
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
-    let mut columns = Columns::new();
     let joints =
         pairs(&plain).iter().map(|(name, command, position)| JointColumns::of_servo(name, command, position, &mut columns)).collect();
     set.columns.extend(columns);

@@ -15,7 +15,8 @@ MANIFEST is a folder (its folders are the units, dates stand in file names), a L
 written before is analysed again. In DIR the table is triage.parquet, one row a recording and joint; a column names the verdict of each row,
 verdicts/KEY.json. Answers are kept by content: the same command continues after an interruption, and several processes may write to one DIR.
 
-Exit codes: 0 nothing changed, 1 a unit changed or differs, 2 usage, 3 wrong input, 5 a file cannot be written, 130 interrupted.";
+Exit codes: 0 nothing changed, 1 a unit changed or differs, 2 usage, 3 wrong input, 5 a file cannot be written, 7 every
+recording is left out, 130 interrupted.";
 
 /// Which shard of how many: `3/20`.
 pub type Shard = (usize, usize);

@@ -31,3 +31,13 @@ pub struct Why {
     #[arg(long)]
     pub json: bool,
 }
+
+/// `backdrive why-now`
+#[derive(Debug, Args)]
+pub struct WhyNow {
+    /// The bag of a run that still lasts.
+    pub recording: PathBuf,
+    /// What was seen of the oscillation, as JSON.
+    #[arg(long, value_name = "JSON")]
+    pub seen: String,
+}

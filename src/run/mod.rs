@@ -1,5 +1,6 @@
 //! `backdrive run` and `backdrive clean`.
 
+mod live;
 mod next;
 mod text;
 
@@ -13,9 +14,12 @@ use crate::progress::Terminal;
 use backdrive_launch::RunHome;
 use backdrive_launch::asked::Meeting;
 use backdrive_nodes::graph::{Graph, Overrides};
+use backdrive_nodes::stage::Clock;
 use backdrive_pages::run::{Heard, page};
+use backdrive_runs::Done;
 use backdrive_runs::way::{Way, run_graph, run_here};
 use backdrive_runs::{experiments, source};
+use live::Windowed;
 use serde_json::json;
 use std::time::Duration;
 
@@ -38,18 +42,43 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         output::writable(html)?;
     }
     let mut heard = Heard::of(&graph);
-    let terminal = Terminal::default();
+    if options.live.is_some() || options.why || options.heal.is_some() {
+        watchable(&way, &graph)?;
+    }
+    let terminal = Windowed::of(options, graph.gains.lambda);
     let done = match &way {
         // What goes by is all there is where no bag is recorded.
         Way::Here if options.result.html.is_some() => run_here(&graph, &terminal, &mut |topic, message| heard.take(topic, message))?,
         Way::Here | Way::Processes(_) => run_graph(&graph, &way, &terminal)?,
     };
+    terminal.end(&ended(&done));
     if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.result.html.is_some()) {
         heard = Heard::from_bag(&graph, bag).map_err(Failure::input)?;
     }
     let steps = next(&done, &graph, None);
     let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
     tell(&done, page, options.result.json, &steps)
+}
+
+/// Whether a page can show the run; what it will not show well is noted.
+fn watchable(way: &Way, graph: &Graph) -> Result<(), Failure> {
+    if matches!(way, Way::Here) {
+        return Err(Failure::input("--live, --why and --heal are for a run of processes; omit --transport inproc"));
+    }
+    if graph.timing.clock == Clock::Lockstep {
+        output::note(
+            "note: in lockstep the run goes as fast as the machine allows; --clock realtime lets it run, and be watched, at its own speed",
+        );
+    }
+    Ok(())
+}
+
+/// How a run has ended, for who watched it.
+fn ended(done: &Done) -> String {
+    let outcome = done.summary.as_ref().and_then(|s| s.outcome).map_or_else(|| "no loop was judged".to_string(), |o| o.to_string());
+    let bag = done.bag.as_ref().map_or(String::new(), |bag| format!("; bag {}", bag.display()));
+    let cause = done.report.as_ref().map_or(String::new(), |r| format!("{}: ", r.cause));
+    format!("{cause}{outcome}{bag}")
 }
 
 /// Runs every experiment of a graph and writes one set of recordings, or one for each step of a protocol: a folder with a bag for each experiment,

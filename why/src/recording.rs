@@ -21,6 +21,13 @@ use std::sync::atomic::AtomicBool;
 #[error("{0}")]
 pub struct RecordingError(String);
 
+impl RecordingError {
+    /// Of an error as a sentence.
+    pub(crate) fn of(error: &dyn Display) -> RecordingError {
+        RecordingError(error.to_string())
+    }
+}
+
 fn wrong(error: impl Display) -> RecordingError {
     RecordingError(error.to_string())
 }
@@ -29,14 +36,14 @@ fn wrong(error: impl Display) -> RecordingError {
 pub struct Recording {
     /// Its signals.
     pub session: Session,
-    ours: Option<Ours>,
+    pub(crate) ours: Option<Ours>,
 }
 
 /// What a bag of a run holds besides its signals.
-struct Ours {
-    graph: Graph,
-    recorded: Recorded,
-    intents: Option<Vec<Intent>>,
+pub(crate) struct Ours {
+    pub(crate) graph: Graph,
+    pub(crate) recorded: Recorded,
+    pub(crate) intents: Option<Vec<Intent>>,
 }
 
 impl Recording {

@@ -148,7 +148,7 @@ pub fn remedies(
 
 /// Whether a loop holds with other grips, on other walls, with every cause as large or small as it may be, and at a higher gain unless lowering it is what
 /// was done.
-fn robust(
+pub(crate) fn robust(
     trial: &Trial,
     hand: &Hand,
     gain: Gain,
@@ -333,7 +333,7 @@ fn motion_kept(session: &Session, free: &Option<Session>, mu: f64) -> f64 {
     if whole > 0.0 { (1.0 - (error / whole).sqrt()).clamp(0.0, 1.0) } else { 1.0 }
 }
 
-fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
+pub(crate) fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
     is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
 }
 

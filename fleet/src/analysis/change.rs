@@ -1,8 +1,10 @@
 //! A change point in the values of one unit: a step, or a rise from a date on.
 //!
 //! For each place the values after it are compared with those before it (least squares, Student's t). The smallest p-value is multiplied by the number of
-//! comparisons (Bonferroni), and t is reduced by the square root of (1 + r) / (1 - r) where successive residuals are correlated with r > 0.
+//! comparisons (Bonferroni), and t is reduced by the square root of (1 + r) / (1 - r) where successive residuals are correlated with r > 0. The scatter
+//! is that of the unit, moderated by the fleet's where there is a [`Prior`].
 
+use super::moderated::{OfUnit, Prior, by_differences};
 use super::statistics::{t_975, two_sided};
 use serde::Serialize;
 
@@ -54,15 +56,13 @@ struct Place {
 }
 
 /// Searches values in their order. `time`: of each value, rising; `variance`: of each, up to a common factor; `correlation`: of successive residuals;
-/// `least`: the size up to which a change counts as none.
-pub fn change(values: &[f64], time: &[f64], variance: &[f64], correlation: f64, least: f64) -> Option<Found> {
+/// `least`: the size up to which a change counts as none; `prior`: how values of a unit scatter in the fleet.
+pub fn change(values: &[f64], time: &[f64], variance: &[f64], correlation: f64, least: f64, prior: Option<Prior>) -> Option<Found> {
     let count = values.len();
     if count < LEAST_ALL || time.len() != count || variance.len() != count {
         return None;
     }
-    let weight: Vec<f64> = variance.iter().map(|v| 1.0 / v.max(f64::MIN_POSITIVE)).collect();
-    let scale = weight.iter().sum::<f64>() / count as f64;
-    let weight: Vec<f64> = weight.iter().map(|w| w / scale).collect();
+    let weight = weights(variance);
     let total: f64 = weight.iter().sum();
     let mean = values.iter().zip(&weight).map(|(y, w)| w * y).sum::<f64>() / total;
     let all: f64 = values.iter().zip(&weight).map(|(y, w)| w * (y - mean).powi(2)).sum();
@@ -77,16 +77,19 @@ pub fn change(values: &[f64], time: &[f64], variance: &[f64], correlation: f64, 
         }
     }
     let best = places.iter().min_by(|a, b| a.left.total_cmp(&b.left))?;
-    let free = (count - 2) as f64;
+    let own = (count - 2) as f64;
     let r = correlation.clamp(0.0, 0.9);
     let inflation = ((1.0 + r) / (1.0 - r)).sqrt();
     // Values that a step explains to the last bit are no measurement; a share of a billionth keeps the t finite.
-    let sd = |place: &Place| (place.left.max(1e-18 * all) / free).sqrt();
+    let left = |place: &Place| place.left.max(1e-18 * all);
+    let (added, of_fleet) = prior.map_or((0.0, 0.0), |prior| prior.added(OfUnit { variance: left(best) / own, free: own }));
+    let free = own + of_fleet;
+    let sd = |place: &Place| ((added + left(place)) / free).sqrt();
     let error = |place: &Place| sd(place) * place.size * inflation;
     let t = (best.effect.abs() - least).max(0.0) / error(best);
     let p = (two_sided(t, free) * places.len() as f64).min(1.0);
-    let near =
-        |place: &&Place| count as f64 / inflation.powi(2) * (place.left.max(1e-18 * all) / best.left.max(1e-18 * all)).ln() <= POSSIBLE;
+    let all_free = count as f64 + of_fleet;
+    let near = |place: &&Place| all_free / inflation.powi(2) * ((added + left(place)) / (added + left(best))).ln() <= POSSIBLE;
     let possible: Vec<&Place> = places.iter().filter(|place| place.shape == best.shape).filter(near).collect();
     let wide = t_975(free);
     let low = possible.iter().map(|place| place.effect - wide * error(place)).fold(f64::INFINITY, f64::min);
@@ -100,6 +103,18 @@ pub fn change(values: &[f64], time: &[f64], variance: &[f64], correlation: f64, 
         interval: [low, high],
         p,
     })
+}
+
+/// Weights of values, 1 on average.
+fn weights(variance: &[f64]) -> Vec<f64> {
+    let weight: Vec<f64> = variance.iter().map(|v| 1.0 / v.max(f64::MIN_POSITIVE)).collect();
+    let scale = weight.iter().sum::<f64>() / weight.len().max(1) as f64;
+    weight.iter().map(|w| w / scale).collect()
+}
+
+/// How values of a unit scatter by their successive differences, in the scale of [`change`].
+pub fn scatter(values: &[f64], variance: &[f64], correlation: f64) -> Option<OfUnit> {
+    (values.len() >= LEAST_ALL).then(|| by_differences(values, &weights(variance), correlation))?
 }
 
 /// Weighted least squares of a level and a multiple of a shape.
@@ -122,7 +137,7 @@ fn placed(shape: Shape, at: usize, x: &[f64], values: &[f64], weight: &[f64]) ->
 
 /// Correlation of successive residuals about the change point that explains the values best; `None` where there are too few.
 pub fn successive(values: &[f64], time: &[f64], variance: &[f64]) -> Option<f64> {
-    let found = change(values, time, variance, 0.0, 0.0)?;
+    let found = change(values, time, variance, 0.0, 0.0, None)?;
     let (from, to) = (time[found.at - 1], time[values.len() - 1]);
     let shape = |i: usize| match found.shape {
         Shape::Step => f64::from(u8::from(i >= found.at)),
@@ -137,6 +152,7 @@ pub fn successive(values: &[f64], time: &[f64], variance: &[f64]) -> Option<f64>
 
 #[cfg(test)]
 mod tests {
+    use super::super::moderated::prior;
     use super::*;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -153,7 +169,7 @@ mod tests {
     #[test]
     fn a_step_is_found_with_its_size_and_date() {
         let values: Vec<f64> = noise(40, 1).iter().enumerate().map(|(i, e)| 10.0 + if i >= 25 { 2.0 } else { 0.0 } + 0.3 * e).collect();
-        let found = change(&values, &time(40), &[1.0; 40], 0.0, 0.0).unwrap();
+        let found = change(&values, &time(40), &[1.0; 40], 0.0, 0.0, None).unwrap();
         assert_eq!((found.shape, found.at), (Shape::Step, 25));
         assert!(found.interval[0] < 2.0 && found.interval[1] > 2.0 && found.interval[1] - found.interval[0] < 0.6, "{found:?}");
         // The t of two samples with pooled variance is that of the textbook.
@@ -169,7 +185,7 @@ mod tests {
     #[test]
     fn a_ramp_is_told_from_a_step() {
         let values: Vec<f64> = noise(50, 2).iter().enumerate().map(|(i, e)| 1.0 + 0.1 * (i as f64 - 29.0).max(0.0) + 0.1 * e).collect();
-        let found = change(&values, &time(50), &[1.0; 50], 0.0, 0.0).unwrap();
+        let found = change(&values, &time(50), &[1.0; 50], 0.0, 0.0, None).unwrap();
         assert_eq!(found.shape, Shape::Ramp);
         assert!(found.possible[0] <= 30 && found.possible[1] >= 30 && (found.effect - 2.0).abs() < 0.3, "{found:?}");
     }
@@ -186,12 +202,38 @@ mod tests {
                         state
                     })
                     .collect();
-                change(&values, &time(50), &[1.0; 50], known, 0.0).map_or(1.0, |found| found.p)
+                change(&values, &time(50), &[1.0; 50], known, 0.0, None).map_or(1.0, |found| found.p)
             };
             (0..1000).filter(|seed| p(*seed) < 0.01).count()
         };
         // Of 1000 at most 10 are expected, and a Poisson count of 10 exceeds 20 with a probability below 0.002.
         assert!(small(0.0, 0.0) <= 20, "{}", small(0.0, 0.0));
         assert!(small(0.4, 0.4) <= 20, "{}", small(0.4, 0.4));
+    }
+
+    #[test]
+    fn the_scatter_of_the_fleet_finds_an_early_step_and_names_no_more_without_one() {
+        // Scatter differs from unit to unit by a χ² with twenty degrees of freedom.
+        let fleet = |seed: u64| -> Vec<Vec<f64>> {
+            let scale = noise(20 * 60, seed + 1000);
+            let sd = |unit: usize| (20.0 / scale[20 * unit..20 * unit + 20].iter().map(|x| x * x).sum::<f64>()).sqrt();
+            (0..60).map(|unit| noise(14, 100 * seed + unit as u64).iter().map(|e| sd(unit) * e).collect()).collect()
+        };
+        let even = [1.0; 14];
+        let prior_of = |units: &[Vec<f64>]| prior(&units.iter().filter_map(|unit| scatter(unit, &even, 0.0)).collect::<Vec<_>>());
+        let mut small = 0;
+        for seed in 0..20 {
+            let units = fleet(seed);
+            let known = prior_of(&units);
+            small += units.iter().filter(|unit| change(unit, &time(14), &even, 0.0, 0.0, known).unwrap().p < 0.01).count();
+        }
+        // Of 1200 at most 12 are expected, and a Poisson count of 12 exceeds 24 with a probability below 0.001.
+        assert!(small <= 24, "{small}");
+        // A step of six times the scatter after four recordings.
+        let mut units = fleet(50);
+        units[0].iter_mut().skip(4).for_each(|value| *value += 6.0);
+        let alone = change(&units[0], &time(14), &even, 0.0, 0.0, None).unwrap();
+        let with = change(&units[0], &time(14), &even, 0.0, 0.0, prior_of(&units)).unwrap();
+        assert!(with.p < 0.1 * alone.p && with.p < 1e-6 && with.at == 4, "{with:?} {alone:?}");
     }
 }

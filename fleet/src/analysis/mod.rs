@@ -2,6 +2,7 @@
 
 pub mod change;
 pub mod common;
+pub mod moderated;
 pub mod observations;
 pub mod odd;
 pub mod pooled;
@@ -15,8 +16,9 @@ pub use words::{amount, sentence_of_change, sentence_of_odd};
 use crate::date::Date;
 use crate::parameter::{self, Parameter};
 use crate::table::Table;
-use change::{Found, change, successive};
+use change::{Found, change, scatter, successive};
 use common::common;
+use moderated::{Prior, prior};
 use observations::{Observations, accepted};
 use pooled::pooled;
 use statistics::{Group, adjusted, median};
@@ -41,6 +43,8 @@ struct Prepared {
     shift: Vec<(Date, f64)>,
     is_removed: bool,
     correlation: f64,
+    /// How values of a unit scatter in the fleet.
+    prior: Option<Prior>,
     /// The size up to which a change counts as none.
     least: f64,
 }
@@ -138,6 +142,7 @@ fn prepared(joint: &str, parameter: Parameter, observations: Observations) -> Pr
         values: common.values,
         observations,
         correlation: 0.0,
+        prior: None,
         least: 0.0,
     };
     // The median over the units: that of one unit is hardly known.
@@ -149,6 +154,8 @@ fn prepared(joint: &str, parameter: Parameter, observations: Observations) -> Pr
         .filter_map(|(values, time, variance, _)| successive(&values, &time, &variance))
         .collect();
     of.correlation = median(&each).max(0.0);
+    let scatters = of.observations.units.keys().filter_map(|unit| dated(&of, unit));
+    of.prior = prior(&scatters.filter_map(|(values, _, variance, _)| scatter(&values, &variance, of.correlation)).collect::<Vec<_>>());
     of
 }
 
@@ -161,7 +168,7 @@ fn least_of(of: &Prepared, all: &[Prepared]) -> f64 {
     match of.parameter.name {
         "constant" => LEAST_SHARE * level("dry"),
         "gain" if !of.observations.is_servo => LEAST_GAIN,
-        "lag" => LEAST_LAG,
+        "lag" | "delay" => LEAST_LAG,
         own => LEAST_SHARE * level(own),
     }
 }
@@ -190,7 +197,7 @@ fn dated(of: &Prepared, unit: &str) -> Option<Dated> {
 
 fn candidate(of: &Prepared, index: usize, unit: &str) -> Option<Candidate> {
     let (values, time, variance, dates) = dated(of, unit)?;
-    let found = change(&values, &time, &variance, of.correlation, of.least)?;
+    let found = change(&values, &time, &variance, of.correlation, of.least, of.prior)?;
     Some(Candidate { prepared: index, unit: unit.to_string(), found, dates })
 }
 
@@ -224,7 +231,7 @@ fn together(all: &[Prepared], false_discoveries: f64) -> Vec<Change> {
         let time: Vec<f64> = of.shift.iter().map(|(date, _)| date.days() as f64).collect();
         let even = vec![1.0; values.len()];
         let correlation = successive(&values, &time, &even).unwrap_or(0.0);
-        if let Some(change) = change(&values, &time, &even, correlation, of.least) {
+        if let Some(change) = change(&values, &time, &even, correlation, of.least, None) {
             found.push((index, change));
         }
     }

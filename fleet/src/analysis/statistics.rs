@@ -49,9 +49,16 @@ pub fn added_variance(groups: &[Group]) -> f64 {
     0.5 * (low + high)
 }
 
+/// The square of a larger one is not finite.
+const LARGEST_T: f64 = 1e100;
+
 /// Probability that Student's t with `free` degrees of freedom is beyond ±`t`.
 pub fn two_sided(t: f64, free: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, free.max(1.0)).map_or(1.0, |of| 2.0 * of.cdf(-t.abs()))
+    // Of values without any scatter and without a change 0 / 0 is no evidence.
+    if t.is_nan() {
+        return 1.0;
+    }
+    StudentsT::new(0.0, 1.0, free.max(1.0)).map_or(1.0, |of| 2.0 * of.cdf(-t.abs().min(LARGEST_T)))
 }
 
 /// The value that Student's t exceeds with a probability of 2.5 %.
@@ -113,5 +120,6 @@ mod tests {
     fn quantiles_of_student_are_those_of_tables() {
         assert!((t_975(10.0) - 2.228).abs() < 1e-3);
         assert!((two_sided(2.228, 10.0) - 0.05).abs() < 1e-4);
+        assert_eq!((two_sided(f64::NAN, 10.0), two_sided(f64::INFINITY, 10.0)), (1.0, two_sided(1e100, 10.0)));
     }
 }

@@ -47,7 +47,7 @@ pub fn amount(effect: f64, ci95: [f64; 2], before: f64, parameter: Parameter, is
 
 /// Whether percents mean something: of friction and inertia, which are never below 0, and a level well above its error.
 fn of_level(ci95: [f64; 2], before: f64, parameter: Parameter) -> bool {
-    ["dry", "viscous", "inertia"].contains(&parameter.name) && before > CERTAIN * 0.5 * (ci95[1] - ci95[0])
+    ["dry", "viscous", "inertia", "delay", "lost_motion"].contains(&parameter.name) && before > CERTAIN * 0.5 * (ci95[1] - ci95[0])
 }
 
 /// Three significant digits.

@@ -1,15 +1,19 @@
 //! A diagnosis and a fit of one recording as rows.
 
+use super::fit;
 use crate::answered::{Answered, Row};
 use crate::error::FleetError;
 use crate::manifest::{Entry, Loaded, Manifest};
 use backdrive_answers::asked::Asked;
 use backdrive_answers::found::{Found, diagnose};
-use backdrive_answers::opened::{Device, Opened, open};
+use backdrive_answers::opened::{Opened, open};
+use backdrive_diagnosis::arms::problem::Problem as ArmProblem;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::options::Options;
 use backdrive_diagnosis::verdict::Finding;
+use backdrive_plant::model::Model;
 use backdrive_predict::fit::{Fit, Options as Fitting};
+use backdrive_servo::problem::{Problem as ServoProblem, is_servo};
 use backdrive_sets::Recordings;
 use serde_json::json;
 use std::sync::atomic::AtomicBool;
@@ -25,15 +29,17 @@ pub(super) fn diagnosed(manifest: &Manifest, entry: &Entry, loaded: &Loaded) -> 
     answered(&found)
 }
 
-/// Refits the parameters of the model to one recording: of one axis by simulation, of an arm or of servos by a diagnosis that may add nothing.
+/// Refits the parameters of the model to one recording: of one axis by simulation, of an arm by regression, of servos by simulation of their answers.
 pub(super) fn fitted(manifest: &Manifest, entry: &Entry, loaded: &Loaded) -> Result<Answered, FleetError> {
-    let opened = opened(manifest, entry, loaded, Options { patience: Some(NO_LIMIT), effects: Some(1), ..Options::default() })?;
-    if !matches!(opened.device, Device::OneAxis(_)) {
-        return Err(FleetError::input("a fit takes devices of one axis; of arms and servos use --what triage or --what diagnose"));
-    }
+    let set = manifest.set_of(entry, loaded)?;
     let Some(model) = entry.model.clone() else { return Err(FleetError::input("no model is named; give one with --model MODEL.toml")) };
-    let set = Recordings::Set(Box::new(manifest.set_of(entry, loaded)?));
-    let options = Fitting { model, set, grip: None, ignored: Vec::new(), effort: 1.0, patience: NO_LIMIT };
+    if is_servo(&set) {
+        return fit::servo(&ServoProblem::open(&set, Some(&model)).map_err(FleetError::input)?);
+    }
+    if Model::load(&model).map_err(FleetError::input)?.arm.is_some() {
+        return fit::arm(&ArmProblem::open(&set, Some(&model)).map_err(FleetError::input)?);
+    }
+    let options = Fitting { model, set: Recordings::Set(Box::new(set)), grip: None, ignored: Vec::new(), effort: 1.0, patience: NO_LIMIT };
     let fitted = Fit::read(&options).and_then(|fit| fit.run(&AtomicBool::new(false), &|_| {})).map_err(FleetError::input)?;
     let mut row = Row::of("device");
     for parameter in fitted.rows.iter().filter(|parameter| parameter.determined) {

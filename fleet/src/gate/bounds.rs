@@ -18,13 +18,15 @@ pub(super) enum Of {
 }
 
 /// Every bound: key, how it is meant, default.
-pub(super) const ALL: [(&str, Of, f64); 16] = [
+pub(super) const ALL: [(&str, Of, f64); 19] = [
     ("dry", Of::Share, 0.15),
     ("viscous", Of::Share, 0.25),
     ("inertia", Of::Share, 0.5),
     ("constant", Of::Dry, 0.5),
     ("gain", Of::Unit, 0.05),
     ("lag", Of::Unit, 0.003),
+    ("delay", Of::Unit, 0.005),
+    ("lost_motion", Of::Share, 0.15),
     ("stribeck", Of::Dry, 0.3),
     ("load_friction", Of::Dry, 0.3),
     ("drag", Of::Dry, 0.3),
@@ -35,6 +37,7 @@ pub(super) const ALL: [(&str, Of, f64); 16] = [
     ("position_step", Of::Share, 0.5),
     ("rate", Of::Share, 0.02),
     ("critical_gain", Of::Share, 0.1),
+    ("gain_margin", Of::Share, 0.2),
 ];
 
 /// Bounds for all joints, and for single joints.

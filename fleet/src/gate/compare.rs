@@ -32,7 +32,7 @@ pub(super) fn joints(old: &Table, new: &Table, bounds: &Bounds) -> Vec<Check> {
     out
 }
 
-fn single(kind: Kind, place: &str, quantity: &str, outcome: Outcome, sentence: String) -> Check {
+pub(super) fn single(kind: Kind, place: &str, quantity: &str, outcome: Outcome, sentence: String) -> Check {
     Check { kind, place: place.to_string(), quantity: quantity.to_string(), old: None, new: None, sd: None, bound: None, outcome, sentence }
 }
 
@@ -191,78 +191,8 @@ fn of_scale(kind: Kind, joint: &str, quantity: &str, old: &[TableRow], new: &[Ta
     })
 }
 
-/// The stability limit and the verdict of the loops.
-pub(super) fn loops(old: &Table, new: &Table, bounds: &Bounds) -> Vec<Check> {
-    if old.rows.is_empty() || new.rows.is_empty() {
-        return Vec::new();
-    }
-    let worst = |table: &Table| -> (f64, bool, BTreeSet<String>) {
-        // Of several recordings the lowest limit counts.
-        let limit = |row: &TableRow| row.numbers.get("critical_gain").or_else(|| row.numbers.get("critical_gain_at_least")).copied();
-        let least = table.rows.iter().filter_map(limit).fold(f64::INFINITY, f64::min);
-        let words: BTreeSet<String> = table.rows.iter().filter_map(|row| row.words.get("verdict").cloned()).collect();
-        let is_open = table.rows.iter().any(|row| !row.numbers.contains_key("critical_gain"));
-        (least, is_open, words)
-    };
-    let ((a, a_is_open, before), (b, b_is_open, after)) = (worst(old), worst(new));
-    let mut out = Vec::new();
-    let bad = |words: &BTreeSet<String>| words.iter().any(|word| ["unstable", "limit_cycle", "limited"].contains(&word.as_str()));
-    let list = |words: &BTreeSet<String>| words.iter().cloned().collect::<Vec<_>>().join(" and ");
-    let outcome = match (bad(&before), bad(&after)) {
-        (false, true) => Outcome::Failed,
-        _ if after.contains("cannot_tell") && !before.contains("cannot_tell") => Outcome::Uncertain,
-        _ => Outcome::Passed,
-    };
-    out.push(single(Kind::Stability, "loop", "verdict", outcome, format!("loop: {} -> {}", list(&before), list(&after))));
-    let bound = bounds.of("loop", "critical_gain").map_or(0.1, |(_, bound)| bound);
-    let known = a.is_finite() && b.is_finite();
-    let outcome = match known {
-        // A limit that was not reached may be above the old one.
-        true if b < a * (1.0 - bound) && b_is_open => Outcome::Uncertain,
-        true if b < a * (1.0 - bound) => Outcome::Failed,
-        false if a.is_finite() => Outcome::Uncertain,
-        _ => Outcome::Passed,
-    };
-    let said = |x: f64, is_open: bool| match x.is_finite() {
-        true if is_open => format!("at least {}", short(x)),
-        true => short(x),
-        false => "not known".to_string(),
-    };
-    let percent = if known && !a_is_open && !b_is_open {
-        format!(" ({:+.0} %; bound -{:.0} %)", 100.0 * (b / a - 1.0), 100.0 * bound)
-    } else {
-        String::new()
-    };
-    out.push(Check {
-        kind: Kind::Stability,
-        place: "loop".to_string(),
-        quantity: "critical_gain".to_string(),
-        old: a.is_finite().then_some(a),
-        new: b.is_finite().then_some(b),
-        sd: None,
-        bound: Some(bound * a).filter(|x| x.is_finite()),
-        outcome,
-        sentence: format!("loop: stability limit mu*lambda {} -> {}{percent}", said(a, a_is_open), said(b, b_is_open)),
-    });
-    let parts = |table: &Table| -> BTreeSet<String> {
-        let texts = table.rows.iter().filter_map(|row| row.words.get("disagreeing_models"));
-        texts.flat_map(|text| text.split(", ")).filter(|part| !part.is_empty()).map(str::to_string).collect()
-    };
-    let (before, after) = (parts(old), parts(new));
-    let added: Vec<String> = after.difference(&before).cloned().collect();
-    let (outcome, sentence) = match added.is_empty() {
-        true => (Outcome::Passed, "loop: every model fits as before".to_string()),
-        false => (
-            Outcome::Failed,
-            format!("loop: the model of {} does not fit any more: `backdrive why` finds what it lacks", added.join(" and ")),
-        ),
-    };
-    out.push(single(Kind::Physics, "loop", "models", outcome, sentence));
-    out
-}
-
 /// Three significant digits.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }

@@ -2,7 +2,9 @@
 
 mod bounds;
 mod compare;
+mod graphs;
 mod junit;
+mod loops;
 mod types;
 
 pub use bounds::Bounds;
@@ -14,7 +16,8 @@ use crate::error::FleetError;
 use crate::manifest::{Entry, Manifest, Source};
 use crate::table::Table;
 use crate::what::What;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Compares two sets of recordings: folders, manifests or single recordings.
 ///
@@ -24,7 +27,8 @@ pub fn gate(old: &Path, new: &Path, model: Option<&Path>, roles: Option<&Path>, 
     let mut notes = Vec::new();
     let [old, new] = [side(old, model, roles, &mut notes)?, side(new, model, roles, &mut notes)?];
     let mut checks = compare::joints(&old.joints, &new.joints, bounds);
-    checks.extend(compare::loops(&old.loops, &new.loops, bounds));
+    let [before, after] = [&old, &new].map(|side| loops::Loops { table: &side.loops, bags: &side.bags });
+    checks.extend(loops::loops(&before, &after, bounds, &mut notes));
     if checks.is_empty() {
         let why = notes.first().map_or(String::new(), |note| format!("; {note}"));
         return Err(FleetError::input(format!("the two sets have no joint and no loop in common, so nothing can be compared{why}")));
@@ -42,18 +46,23 @@ pub fn gate(old: &Path, new: &Path, model: Option<&Path>, roles: Option<&Path>, 
 struct Side {
     joints: Table,
     loops: Table,
+    /// The bags of the loops by the names of their recordings.
+    bags: BTreeMap<String, PathBuf>,
 }
 
 fn side(path: &Path, model: Option<&Path>, roles: Option<&Path>, notes: &mut Vec<String>) -> Result<Side, FleetError> {
     let mut manifest = opened(path, model)?;
     manifest.roles = roles.map(Path::to_path_buf).or(manifest.roles);
-    let mut side = Side { joints: Table::new(What::Triage), loops: Table::new(What::Stability) };
+    let mut side = Side { joints: Table::new(What::Triage), loops: Table::new(What::Stability), bags: BTreeMap::new() };
     for entry in &manifest.entries {
         let loaded = entry.load()?;
         let is_bag = matches!(&entry.source, Source::File(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")));
         let of_loop = if is_bag || manifest.roles.is_some() { Some(answer(&manifest, entry, &loaded, What::Stability)?) } else { None };
         if let Some(found) = of_loop.filter(|found| found.error.is_none()) {
             side.loops.add(entry, "", &found);
+            if let (Source::File(path), None) = (&entry.source, &manifest.roles) {
+                side.bags.insert(entry.name.clone(), path.clone());
+            }
             continue;
         }
         let found = answer(&manifest, entry, &loaded, What::Triage)?;

@@ -10,8 +10,10 @@ pub enum Kind {
     Physics,
     /// A parameter of a joint.
     Parameter,
-    /// Sample rate or jitter.
+    /// Sample rate, jitter, or delay of a connection.
     Rate,
+    /// Gains of a loop.
+    Gain,
     /// A sensor: noise, step, or a problem of the recording.
     Sensor,
     /// The stability of a loop.

@@ -1,5 +1,6 @@
 //! A manifest as a TOML file.
 
+use super::address::local;
 use super::folder::{self, date_in_bag};
 use super::types::{Entry, Manifest, Source};
 use crate::date::Date;
@@ -29,7 +30,7 @@ pub(super) fn open(path: &Path) -> Result<Manifest, FleetError> {
         let below = table.need_string("path").map_err(FleetError::input)?;
         let unit = table.string("unit").map_err(FleetError::input)?;
         let own = table.string("model").map_err(FleetError::input)?.map(|model| folder.join(model));
-        let place = folder.join(&below);
+        let place = folder.join(local(Path::new(&below))?);
         if !place.is_dir() {
             return Err(FleetError::input(table.error_at("path", format!("there is no folder {}", place.display()))));
         }
@@ -61,7 +62,7 @@ fn settings(path: &Path) -> Result<String, FleetError> {
 
 fn recording(table: &mut Table, folder: &Path) -> Result<Entry, FleetError> {
     let file = table.need_string("file").map_err(FleetError::input)?;
-    let path: PathBuf = folder.join(&file);
+    let path: PathBuf = folder.join(local(Path::new(&file))?);
     let name = table.string("name").map_err(FleetError::input)?.unwrap_or_else(|| file.clone());
     let stated = table.string("date").map_err(FleetError::input)?;
     let date = match &stated {

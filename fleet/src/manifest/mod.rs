@@ -2,6 +2,7 @@
 //!
 //! A manifest is a TOML file, a folder of recordings whose folders are the units, or a LeRobot dataset whose episodes are the recordings.
 
+mod address;
 mod file;
 mod folder;
 mod types;
@@ -17,6 +18,8 @@ impl Manifest {
     /// # Errors
     /// A file or folder is missing or wrong, two recordings have one name, or there is none.
     pub fn open(path: &Path, model: Option<&Path>) -> Result<Manifest, FleetError> {
+        let local = address::local(path)?;
+        let path = local.as_path();
         let own = path.join("fleet.toml");
         let mut manifest = match path.is_dir() {
             true if own.is_file() => file::open(&own)?,
@@ -36,5 +39,25 @@ impl Manifest {
             true => Err(FleetError::input(format!("{}: lists no recordings", path.display()))),
             false => Ok(manifest),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_address_is_a_path_and_others_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.csv"), "t,x\n0,1\n").unwrap();
+        let address = format!("file://{}", folder.path().display());
+        assert_eq!(Manifest::open(Path::new(&address), None).unwrap().entries.len(), 1);
+        let listed = format!("[[recordings]]\nfile = \"{address}/a.csv\"\nunit = \"1\"\n[[folders]]\npath = \"s3://logs/unit-2\"\n");
+        let manifest = folder.path().join("fleet.toml");
+        std::fs::write(&manifest, listed).unwrap();
+        let refused = Manifest::open(&manifest, None).unwrap_err().to_string();
+        assert!(refused.contains("s3://logs/unit-2") && refused.contains("mount"), "{refused}");
+        let refused = Manifest::open(Path::new("s3://logs"), None).unwrap_err().to_string();
+        assert!(refused.contains("s3://logs: s3:// is not read"), "{refused}");
     }
 }

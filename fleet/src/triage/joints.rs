@@ -10,6 +10,7 @@ use backdrive_diagnosis::recordings::noise::{step_of, white};
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::set::RecordingSet;
 use backdrive_servo::problem::{Problem as Servo, is_servo};
+use backdrive_servo::record::Record;
 use backdrive_sets::Recordings;
 use std::path::Path;
 
@@ -46,6 +47,8 @@ pub struct JointData {
     pub effort_noise: Option<f64>,
     /// Displacement over which dry friction turns its direction, rad or m.
     pub turn: f64,
+    /// Of a servo: commands and positions as recorded.
+    pub record: Option<Record>,
 }
 
 /// The joints of the one recording of a set.
@@ -101,7 +104,7 @@ fn servo(set: &RecordingSet, model: Option<&Path>) -> Result<Vec<JointData>, Fle
             let of = Log { position: vec![along], ..log_of(&record.name, &record.t, Vec::new(), record.position.clone()) };
             Motion::of(&of, &rates).position.remove(0)
         });
-        out.push(joint(&own.name, true, &log, &motion, &rates, 0, gravity));
+        out.push(JointData { record: Some(record.clone()), ..joint(&own.name, true, &log, &motion, &rates, 0, gravity) });
     }
     Ok(out)
 }
@@ -164,6 +167,7 @@ fn joint(name: &str, is_servo: bool, log: &Log, motion: &Motion, rates: &Rates, 
         position_step: step_of(&log.position[j]),
         effort_noise: noise_beside_jumps(&log.torque[j]),
         turn: turn(&log.position[j]),
+        record: None,
     }
 }
 

@@ -2,10 +2,11 @@
 //!
 //! The torque of a joint less that of the model's links is `dry·s + viscous·v + constant + gain·τ_links + inertia·a - lag·dτ_links/dt`, where s is the
 //! direction of dry friction. Of a joint by commands and positions the command less the position takes the place of the torque. Both sides go through the
-//! filters of the regression of arms ([`backdrive_diagnosis::arms::motion`]).
+//! filters of the regression of arms ([`backdrive_diagnosis::arms::motion`]). Delay and lost motion of a servo are fitted in time ([`response`](mod@response)).
 
 mod joints;
 mod regress;
+mod response;
 
 use crate::answered::{Answered, Row};
 use crate::error::FleetError;
@@ -14,6 +15,7 @@ use crate::parameter;
 use backdrive_inspect::{Options, Report, Source as Inspected, Weight, inspect};
 use joints::{JointData, joints_of};
 use regress::{Regressed, regress};
+use response::{Start, response};
 use serde_json::json;
 
 /// Triage of one recording.
@@ -51,11 +53,20 @@ fn checked(entry: &Entry, loaded: &Loaded) -> Result<Report, String> {
 fn row(joint: &JointData, found: &Regressed, report: Option<&Report>) -> Row {
     let mut row = Row::of(&joint.name);
     row.word("kind", if joint.is_servo { "servo" } else { "torque" });
-    for (parameter, estimate) in parameter::ALL.iter().zip(&found.parameters) {
+    let mut estimated = |name: &str, estimate: Option<(f64, f64)>| {
         if let Some((value, sd)) = estimate {
-            row.number(parameter.name, *value);
-            row.number(&format!("{}_sd", parameter.name), *sd);
+            row.number(name, value);
+            row.number(&format!("{name}_sd"), sd);
         }
+    };
+    for (parameter, estimate) in parameter::REGRESSED.iter().zip(&found.parameters) {
+        estimated(parameter.name, *estimate);
+    }
+    if let (Some(record), [dry, lag, ..]) = (&joint.record, &found.parameters) {
+        let size = |of: &Option<(f64, f64)>| of.map_or(0.0, |(value, _)| value.max(0.0));
+        let found = response(record, &Start { lag: size(lag), dead_zone: size(dry) });
+        estimated(parameter::DELAY.name, found.delay);
+        estimated(parameter::LOST_MOTION.name, found.lost_motion);
     }
     for (effect, estimate) in parameter::EFFECTS.iter().zip(&found.effects) {
         if let Some((value, sd)) = estimate {

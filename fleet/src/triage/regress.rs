@@ -1,7 +1,7 @@
 //! The regression of one joint: least squares, with standard errors that hold for correlated residuals.
 
 use super::joints::{JointData, LEAST_ROWS};
-use crate::parameter::{ALL, EFFECTS, GAIN, LAG};
+use crate::parameter::{EFFECTS, GAIN, LAG, REGRESSED};
 use backdrive_diagnosis::arms::physics::direction;
 use backdrive_signal::derivative;
 use backdrive_signal::statistics::rms;
@@ -16,8 +16,8 @@ const FOLDS: usize = 8;
 
 /// What a regression gave.
 pub struct Regressed {
-    /// Value and standard error of each of [`ALL`]; `None` where the motion does not determine it.
-    pub parameters: [Option<(f64, f64)>; ALL.len()],
+    /// Value and standard error of each of [`REGRESSED`]; `None` where the motion does not determine it.
+    pub parameters: [Option<(f64, f64)>; REGRESSED.len()],
     /// Size and standard error of each of [`EFFECTS`], added alone; `None` where the motion does not determine it.
     pub effects: [Option<(f64, f64)>; EFFECTS.len()],
     /// Rms of the residual, in the unit of the effort.
@@ -46,16 +46,16 @@ pub fn regress(joint: &JointData) -> Regressed {
     let left = masked(&own);
     let one = vec![1.0; left.len().max(joint.effort.len())];
     let friction = direction(joint.position.iter().copied(), joint.turn);
-    let signals: [&[f64]; ALL.len()] = [&friction, &joint.velocity, &one[..joint.effort.len()], links, &joint.acceleration, &late];
+    let signals: [&[f64]; REGRESSED.len()] = [&friction, &joint.velocity, &one[..joint.effort.len()], links, &joint.acceleration, &late];
     let mut columns: Vec<(Option<usize>, Vec<f64>)> = Vec::new();
     for (index, signal) in signals.iter().enumerate() {
-        let needs_links = ALL[index] == GAIN || ALL[index] == LAG;
+        let needs_links = REGRESSED[index] == GAIN || REGRESSED[index] == LAG;
         // The error of a servo's position is a lag by itself.
-        if needs_links && (load.is_none() || joint.is_servo && ALL[index] == LAG) {
+        if needs_links && (load.is_none() || joint.is_servo && REGRESSED[index] == LAG) {
             continue;
         }
         columns.push((Some(index), masked(signal)));
-        if ALL[index].name == "constant" && load.is_none() && joint.is_servo {
+        if REGRESSED[index].name == "constant" && load.is_none() && joint.is_servo {
             // Gravity without a model: a sine of the joint's own angle.
             for wave in [f64::sin, f64::cos] {
                 columns.push((None, masked(&joint.position.iter().map(|q| wave(*q)).collect::<Vec<f64>>())));
@@ -65,7 +65,7 @@ pub fn regress(joint: &JointData) -> Regressed {
     let columns = independent(columns);
     let rows = masked(&one[..joint.effort.len()]).iter().filter(|x| **x > 0.5).count();
     let mut out = Regressed {
-        parameters: [None; ALL.len()],
+        parameters: [None; REGRESSED.len()],
         effects: [None; EFFECTS.len()],
         residual: rms(&left),
         effort: spread(&joint.effort),

@@ -1,5 +1,6 @@
 //! What happens between the start of a run and its end.
 
+mod answers;
 mod deaths;
 mod standing;
 mod start;
@@ -11,6 +12,7 @@ mod times;
 pub(crate) use state::{MOST_EVENTS, Supervisor};
 pub(crate) use times::seconds_since;
 
+use crate::asks::Asked;
 use crate::child::{Heard, Notice};
 use crate::error::LaunchError;
 use crate::hosts::Hosts;
@@ -27,7 +29,12 @@ const TICK: Duration = Duration::from_millis(50);
 
 impl Supervisor {
     /// The whole life of the run. Afterwards nothing of it is left.
-    pub async fn run(mut self, mut signals: Signals, commands: Option<mpsc::Receiver<Command>>) -> Result<RunReport, LaunchError> {
+    pub async fn run(
+        mut self,
+        mut signals: Signals,
+        commands: Option<mpsc::Receiver<Command>>,
+        asks: Option<mpsc::Receiver<Asked>>,
+    ) -> Result<RunReport, LaunchError> {
         match Hosts::begin(&self.plan, &self.session) {
             Ok(hosts) => self.hosts = hosts,
             Err(e) => {
@@ -46,7 +53,7 @@ impl Supervisor {
                 break;
             }
         }
-        self.watch(&mut signals, commands).await;
+        self.watch(&mut signals, commands, asks).await;
         // Output is ignored from now on: a process with much output must not wait for its listener.
         self.heard = None;
         if !self.unkillable {
@@ -67,7 +74,12 @@ impl Supervisor {
         self.error.map_or(Ok(report), Err)
     }
 
-    async fn watch(&mut self, signals: &mut Signals, mut commands: Option<mpsc::Receiver<Command>>) {
+    async fn watch(
+        &mut self,
+        signals: &mut Signals,
+        mut commands: Option<mpsc::Receiver<Command>>,
+        mut asks: Option<mpsc::Receiver<Asked>>,
+    ) {
         let Some(mut heard) = self.heard.take() else { return };
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -75,6 +87,12 @@ impl Supervisor {
             let command = async {
                 match &mut commands {
                     Some(commands) => commands.recv().await,
+                    None => std::future::pending().await,
+                }
+            };
+            let ask = async {
+                match &mut asks {
+                    Some(asks) => asks.recv().await,
                     None => std::future::pending().await,
                 }
             };
@@ -90,6 +108,10 @@ impl Supervisor {
                 command = command => match command {
                     Some(command) => self.obey(command),
                     None => commands = None,
+                },
+                ask = ask => match ask {
+                    Some(asked) => self.answer(asked),
+                    None => asks = None,
                 },
             }
         }
@@ -164,7 +186,7 @@ impl Supervisor {
         }
     }
 
-    fn obey(&mut self, command: Command) {
+    pub(crate) fn obey(&mut self, command: Command) {
         match command {
             Command::Stop => self.stop(Cause::Stopped { by: "command".to_string() }),
             Command::Gains { mu, lambda, ramp_s } => {

@@ -44,6 +44,8 @@ pub(crate) struct Supervisor {
     pub loss: Option<Cause>,
     pub(crate) error: Option<LaunchError>,
     pub(crate) gains: Option<ToNode>,
+    /// When a run whose force has been removed ends, and who asked for that.
+    pub(crate) release: Option<(Instant, String)>,
     pub events: Vec<RunEvent>,
     pub events_left_out: u64,
     pub deaths: Vec<Death>,
@@ -85,6 +87,7 @@ impl Supervisor {
             loss: None,
             error: None,
             gains: None,
+            release: None,
             events: Vec::new(),
             events_left_out: 0,
             deaths: Vec::new(),

@@ -26,6 +26,7 @@ impl Supervisor {
     /// Whatever is due.
     pub(crate) fn act(&mut self, now: Instant) {
         self.meet();
+        self.released(now);
         self.see_planned_end(now);
         self.continue_stopped(now);
         if self.start.is_none() && !self.stopping && now.saturating_duration_since(self.begun) > self.options.ready_timeout {

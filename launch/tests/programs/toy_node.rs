@@ -109,7 +109,7 @@ fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
                 }
                 std::thread::sleep(Duration::from_millis(20));
             }
-            Err(mpsc::RecvTimeoutError::Timeout) => {}
+            Ok(ToNode::Canceller { .. } | ToNode::Note(_)) | Err(mpsc::RecvTimeoutError::Timeout) => {}
         }
         let Some(begun) = begun else { continue };
         let told = say(&FromNode::Status(status(toy, Some(begun))));

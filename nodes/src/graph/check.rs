@@ -1,6 +1,7 @@
 //! What a graph must be to run: every needed input fed once, one publisher per topic, no loop without delay, axes that agree.
 
 use super::{Connection, Direction, Graph, Node, NodeKind, Settings};
+use backdrive_devices::file::Takes;
 use backdrive_plant::model::InputKind;
 use backdrive_plant::tomlfile::{FileError, Table};
 
@@ -24,6 +25,7 @@ pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
     axes_agree(graph, &of_node, &of_connection)?;
     no_loop_without_delay(graph, &of_connection)?;
     excitations_within_limits(graph, top)?;
+    devices_can_run(graph, &of_node)?;
     for node in &graph.nodes {
         if node.restart && graph.timing.clock == crate::stage::Clock::Lockstep {
             return Err(of_node(node, "restart needs clock = \"realtime\": in lockstep the others cannot go on without it".into()));
@@ -72,6 +74,23 @@ fn inputs_are_fed(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection)
 fn slaves_are_driven(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection) -> Result<(), FileError> {
     for (index, node) in graph.nodes.iter().enumerate().filter(|(_, n)| n.kind == NodeKind::Slave) {
         let feeding = |port: &str| graph.connections.iter().find(|c| c.to.0 == index && c.to.1 == port);
+        if let Some(device) = &node.device {
+            let wanted = match device.file.takes() {
+                Takes::Position => "command",
+                Takes::Effort => "force",
+                Takes::Nothing => {
+                    let message = "its device takes nothing (takes = \"nothing\"), so it cannot follow; a slave needs position or effort";
+                    return Err(of_node(node, message.into()));
+                }
+            };
+            if feeding(wanted).is_none() {
+                return Err(of_node(
+                    node,
+                    format!("its device takes {}, and nothing is connected to its input \"{wanted}\"", device.file.takes().name()),
+                ));
+            }
+            continue;
+        }
         let model = match &node.settings {
             Settings::Slave(files) => files.model.as_ref(),
             _ => None,
@@ -107,6 +126,26 @@ fn slaves_are_driven(graph: &Graph, of_node: &OfNode, of_connection: &OfConnecti
                 return Err(of_node(node, "nothing is connected to its inputs \"command\" and \"force\"; it needs one of them".into()));
             }
             _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// A device has its own time, and one process owns its port.
+fn devices_can_run(graph: &Graph, of_node: &OfNode) -> Result<(), FileError> {
+    for node in &graph.nodes {
+        let Some(device) = node.device.as_ref().filter(|device| !device.is_recorded) else { continue };
+        if graph.timing.clock == crate::stage::Clock::Lockstep {
+            let message = "a device runs in real time only: write clock = \"realtime\"; or simulate it (--master MODEL, --slave MODEL)";
+            return Err(of_node(node, message.into()));
+        }
+        let same = |other: &&Node| {
+            let theirs = other.device.as_ref().filter(|other| other.emulator.is_none() && device.emulator.is_none());
+            other.name != node.name && theirs.is_some_and(|other| other.file.port == device.file.port)
+        };
+        if let Some(other) = graph.nodes.iter().find(same) {
+            let port = device.file.port.display();
+            return Err(of_node(node, format!("\"{}\" has the port {port} too: one process owns a port", other.name)));
         }
     }
     Ok(())

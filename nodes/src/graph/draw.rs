@@ -1,6 +1,7 @@
 //! Draws a graph as text: every node with its ports, every connection as a line beside them.
 
 use super::{Connection, Direction, Graph, Node, NodeKind, ObserverFiles, Settings, check::order};
+use backdrive_devices::file::Takes;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -80,6 +81,18 @@ fn describe(node: &Node) -> String {
     if let Some(program) = node.command.as_ref().and_then(|words| words.first()) {
         let name = Path::new(program).file_name().map_or(program.clone(), |n| n.to_string_lossy().to_string());
         return format!("{}: the program {name}", kind.name());
+    }
+    if let Some(device) = &node.device {
+        let unilateral = kind == NodeKind::Master && device.file.takes() != Takes::Effort;
+        return format!(
+            "{}: device {} ({}, {} joints{}{})",
+            kind.name(),
+            device.file.name,
+            device.file.protocol.name(),
+            device.file.joints.len(),
+            if device.emulator.is_some() { ", emulated" } else { "" },
+            if unilateral { "; unilateral: gives no force" } else { "" }
+        );
     }
     match &node.settings {
         Settings::Master(device)

@@ -26,4 +26,4 @@ pub use files::Files;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};
 pub use overrides::{Overrides, with_files_renamed};
 pub use parse::MAX_RATE_HZ;
-pub use types::{Connection, DeviceFiles, Experiment, Graph, Host, Node, ObserverFiles, Settings};
+pub use types::{Connection, DeviceFiles, Experiment, Graph, Host, Node, ObserverFiles, RealDevice, Settings};

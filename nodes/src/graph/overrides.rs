@@ -65,7 +65,7 @@ pub struct Overrides {
 }
 
 /// Keys of node tables that name files.
-const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording", "map", "cycle", "specimen"];
+const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording", "map", "cycle", "specimen", "device", "emulator"];
 
 impl Overrides {
     /// Names of the files that the changes put into the graph.
@@ -165,6 +165,11 @@ impl Overrides {
             for node in node_tables(doc) {
                 if node.get("kind").and_then(Item::as_str) == Some(kind.name()) {
                     node[key] = item.clone();
+                    if matches!(option, "--master" | "--slave") {
+                        // The model takes the place of a real device.
+                        node.remove("device");
+                        node.remove("emulator");
+                    }
                     found = true;
                 }
             }

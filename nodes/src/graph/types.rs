@@ -13,6 +13,7 @@ use backdrive_control::operator::Intent;
 use backdrive_control::rig::RigSettings;
 use backdrive_control::scaling::GainPlan;
 use backdrive_control::speed_control::SpeedControl;
+use backdrive_devices::file::DeviceFile;
 use backdrive_msgs::topic::Topic;
 use backdrive_plant::model::{Fragment, Model};
 use std::net::Ipv4Addr;
@@ -103,10 +104,23 @@ pub struct Node {
     pub axis_names: Vec<String>,
     /// Topics that the file names for its output ports, in place of the usual ones.
     pub topics: Vec<(String, String)>,
+    /// The real device of a master or slave, in place of a simulated one.
+    pub device: Option<RealDevice>,
     /// What its kind needs.
     pub settings: Settings,
     /// Line of the file where it begins.
     pub line: usize,
+}
+
+/// A real device of a master or slave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RealDevice {
+    /// Its file, read.
+    pub file: DeviceFile,
+    /// The file of an emulator that takes its place. It is never a part of a recording.
+    pub emulator: Option<PathBuf>,
+    /// Whether the graph stands in a recording, so that the device is not opened: a recording may come from a stranger.
+    pub is_recorded: bool,
 }
 
 /// A simulated device's files, read.

@@ -1,6 +1,6 @@
 //! How other threads reach a running node, and what it reports to them.
 
-use crate::protocol::NodeStatus;
+use crate::protocol::{NodeStatus, Note};
 use backdrive_msgs::{Gains, LAYOUT};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,6 +34,17 @@ pub struct Control {
     stop: AtomicBool,
     pub(super) has_gains: AtomicBool,
     pub(super) gains: Mutex<Vec<Gains>>,
+    pub(super) has_asked: AtomicBool,
+    pub(super) asked: Mutex<Vec<Asked>>,
+}
+
+/// What may be asked of a running node beside gains.
+#[derive(Debug, Clone)]
+pub(super) enum Asked {
+    /// The canceller: whether it subtracts, and over how many seconds it fades.
+    Canceller(bool, f64),
+    /// An event of somebody else.
+    Note(Note),
 }
 
 impl Control {
@@ -52,6 +63,23 @@ impl Control {
         let gains = Gains { layout: LAYOUT, source: 0, step: 0, sequence: 0, stamp_ns: 0, mu, lambda, ramp_s };
         self.gains.lock().unwrap_or_else(PoisonError::into_inner).push(gains);
         self.has_gains.store(true, Ordering::SeqCst);
+    }
+
+    /// Leaves the canceller out of the loop or takes it back, faded over `ramp_s` seconds.
+    pub fn switch_canceller(&self, on: bool, ramp_s: f64) {
+        if ramp_s.is_finite() && ramp_s >= 0.0 {
+            self.ask(Asked::Canceller(on, ramp_s));
+        }
+    }
+
+    /// Has an event published at the next step.
+    pub fn note(&self, note: Note) {
+        self.ask(Asked::Note(note));
+    }
+
+    fn ask(&self, asked: Asked) {
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner).push(asked);
+        self.has_asked.store(true, Ordering::SeqCst);
     }
 }
 

@@ -39,6 +39,14 @@ pub enum RunError {
         /// What is wrong.
         reason: String,
     },
+    /// A device cannot be opened, or fails a check.
+    #[error("node `{node}`: {reason}")]
+    Device {
+        /// The node.
+        node: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// A recording lacks messages.
     #[error("{lost} messages lost; the bag lists their topics")]
     Incomplete {
@@ -56,7 +64,7 @@ impl RunError {
         match self {
             RunError::Plan { .. } => 3,
             RunError::Lost { .. } | RunError::Incomplete { .. } => 4,
-            RunError::Transport(_) | RunError::Taken(_) | RunError::PeerTimeout { .. } | RunError::Bag(_) => 5,
+            RunError::Device { .. } | RunError::Transport(_) | RunError::Taken(_) | RunError::PeerTimeout { .. } | RunError::Bag(_) => 5,
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::control::{Control, SLICE_NS, Told};
 use super::error::RunError;
 use super::state::Runner;
+use crate::book::simulated_ns;
 use crate::clock::now_ns;
 use crate::sentences::sentence;
 use crate::transport::TransportError;
@@ -20,6 +21,8 @@ impl Runner {
                 let teller = &mut self.members[member].teller;
                 teller.tell_broken(step, teller.book.simulated_ns(step), &e, tell);
             }
+            let rate_hz = self.timing.rate_hz;
+            self.take_asked(control, |step| simulated_ns(step, rate_hz), tell);
             let (mut stepped, mut finished) = (false, true);
             for i in 0..self.stages.len() {
                 let stage = &mut self.stages[i];

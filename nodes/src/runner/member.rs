@@ -13,6 +13,9 @@ pub(super) struct Member {
     pub(super) gains_in: Option<Box<dyn Subscriber>>,
     pub(super) gains_out: Option<Output>,
     pub(super) margin_out: Option<Output>,
+    pub(super) lists: Vec<Output>,
+    /// Step from which the next lists are due.
+    pub(super) lists_due: u64,
     pub(super) loop_time: Histogram,
     pub(super) loop_time_recent: Histogram,
     /// Steps left out because the node was too far behind.
@@ -24,7 +27,7 @@ pub(super) struct Member {
 impl Member {
     /// Outputs beside those of its stages.
     pub(super) fn side_outputs(&self) -> impl Iterator<Item = &Output> {
-        [&self.teller.events, &self.teller.status].into_iter().chain(&self.gains_out).chain(&self.margin_out)
+        [&self.teller.events, &self.teller.status].into_iter().chain(&self.gains_out).chain(&self.margin_out).chain(&self.lists)
     }
 
     /// Its figures, with what its stages lost and refused, and times from this histogram.

@@ -35,6 +35,7 @@ impl Runner {
                 let step = self.stages.iter().find(|s| s.member == member).map_or(0, |s| s.step);
                 self.members[member].teller.tell_broken(step, unix(now), &e, tell);
             }
+            self.take_asked(control, |_| unix(now), tell);
             let (mut wake_at, mut waits_for_input, mut finished, mut stepped) = (now + SLICE_NS, false, true, false);
             for i in 0..self.stages.len() {
                 let stage = &mut self.stages[i];

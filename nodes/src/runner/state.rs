@@ -73,6 +73,7 @@ impl Runner {
             let (events, status) = (output(&plan.events, 0)?, output(&plan.status, 0)?);
             let gains_out = plan.gains_out.as_ref().map(|t| output(t, 0)).transpose()?;
             let margin_out = plan.margin_out.as_ref().map(|t| output(t, 0)).transpose()?;
+            let lists = plan.lists.iter().map(|(t, numbers)| output(t, *numbers)).collect::<Result<Vec<_>, _>>()?;
             let book = Book::new(&plan.name, timing);
             gains_topics.push(plan.gains_in);
             members.push(Member {
@@ -81,6 +82,8 @@ impl Runner {
                 gains_in: None,
                 gains_out,
                 margin_out,
+                lists,
+                lists_due: 0,
                 loop_time: Histogram::default(),
                 loop_time_recent: Histogram::default(),
                 skipped: 0,
@@ -131,6 +134,21 @@ impl Runner {
         let gains = self.members.iter_mut().filter_map(|m| m.gains_in.as_mut()).find_map(|gains| gains.stranger());
         let stranger = gains.or_else(|| self.stages.iter_mut().flat_map(|s| &mut s.inputs).find_map(Input::stranger));
         stranger.map_or(Ok(()), |e| Err(RunError::Taken(e)))
+    }
+
+    /// Opens what a node needs of the world, before its first step. What a person should know becomes events.
+    ///
+    /// # Errors
+    /// A device cannot be opened, or fails a check.
+    pub fn begin(&mut self, tell: &mut dyn FnMut(Told)) -> Result<(), RunError> {
+        for stage in &mut self.stages {
+            let member = &mut self.members[stage.member];
+            let notes = stage.core.begin().map_err(|reason| RunError::Device { node: member.name.clone(), reason })?;
+            for note in notes {
+                member.teller.tell_event(0, 0, "device_note", NO_VALUE, 1, Text::new(&note), tell);
+            }
+        }
+        Ok(())
     }
 
     /// What it still lacks before it can start, one line each.

@@ -1,15 +1,16 @@
 //! One step of a stage, and the report on the steps.
 
-use super::control::{Control, Told};
+use super::control::{Asked, Control, Told};
 use super::stage::{lost, refused, want};
 use super::state::Runner;
-use crate::book::Health;
+use crate::book::{Health, NO_VALUE};
 use crate::clock::now_ns;
 use crate::input::Input;
-use crate::protocol::MarginStatus;
+use crate::protocol::{MarginStatus, Note};
 use crate::sentences::sentence;
 use crate::transport::TransportError;
 use backdrive_control::core::Tick;
+use backdrive_msgs::text::Text;
 use backdrive_msgs::{LAYOUT, Message, Sample};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
@@ -55,6 +56,16 @@ impl Runner {
         {
             member.teller.report.margin = Some(MarginStatus::from(&margin));
             first_error = first_error.and(output.publisher.send(&Message::Margin(margin)));
+        }
+        if stage.is_first && step >= member.lists_due {
+            member.lists_due = step + (self.timing.rate_hz / LISTS_HZ).ceil() as u64;
+            for (index, output) in member.lists.iter_mut().enumerate() {
+                let Some(values) = stage.core.report(index) else { continue };
+                let mut list = Sample { position: values, source: member.teller.book.source, step, stamp_ns, ..Sample::new(output.axes) };
+                (list.layout, list.sequence) = (LAYOUT, output.sequence);
+                output.sequence += 1;
+                first_error = first_error.and(output.publisher.send(&Message::Sample(list)));
+            }
         }
         for (sample, output) in stage.samples.iter_mut().zip(&mut stage.outputs) {
             (sample.layout, sample.source) = (LAYOUT, member.teller.book.source);
@@ -111,6 +122,26 @@ impl Runner {
         strangers
     }
 
+    /// What else the supervisor asks for: switches, and events of others, which the first node publishes at the step of its first stage.
+    pub(super) fn take_asked(&mut self, control: &Control, stamp: impl Fn(u64) -> i64, tell: &mut dyn FnMut(Told)) {
+        if !control.has_asked.swap(false, Ordering::Relaxed) {
+            return;
+        }
+        let asked = std::mem::take(&mut *control.asked.lock().unwrap_or_else(PoisonError::into_inner));
+        let step = self.stages.iter().find(|s| s.member == 0).map_or(0, |s| s.step);
+        for asked in asked {
+            match asked {
+                Asked::Canceller(on, ramp_s) => self.stages.iter_mut().for_each(|s| s.core.set_active(on, ramp_s)),
+                Asked::Note(Note { severity, kind, text, value }) => {
+                    if let Some(member) = self.members.first_mut() {
+                        let value = value.unwrap_or(NO_VALUE);
+                        member.teller.tell_event(step, stamp(step), &kind, value, severity, Text::new(&text), tell);
+                    }
+                }
+            }
+        }
+    }
+
     pub(super) fn report_if_due(&mut self, now: i64, tell: &mut dyn FnMut(Told)) {
         if now - self.reported_at < REPORT_EVERY_NS {
             return;
@@ -121,6 +152,10 @@ impl Runner {
             tell(Told::Status { source: member.teller.book.source, status });
             member.teller.report.peak_effort = 0.0;
             member.loop_time_recent.clear();
+            // What is sent rarely, such as the gains in force, reaches who joins late only where its publisher looks for new listeners.
+            for output in member.side_outputs() {
+                let _ = output.publisher.listeners();
+            }
         }
     }
 
@@ -142,3 +177,6 @@ impl Runner {
 }
 
 const REPORT_EVERY_NS: i64 = 100_000_000;
+
+/// Lists of named numbers per second.
+const LISTS_HZ: f64 = 10.0;

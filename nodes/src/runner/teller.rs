@@ -35,7 +35,7 @@ impl Teller {
         &mut self,
         step: u64,
         stamp_ns: i64,
-        kind: &'static str,
+        kind: &str,
         value: f64,
         severity: u32,
         text: Text<128>,

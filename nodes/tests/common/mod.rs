@@ -79,6 +79,7 @@ pub fn node(name: &str, stages: Vec<Stage>) -> NodePlan {
         status: side("status", Kind::Status),
         gains_in: None,
         gains_out: has_gains.then(|| side("gains", Kind::Gains)),
+        lists: Vec::new(),
         margin_out: None,
     }
 }

@@ -98,6 +98,7 @@ impl Alone {
             gains_in: None,
             gains_out: None,
             margin_out: None,
+            lists: Vec::new(),
         };
         let outputs: Vec<String> = node.stages.iter().flat_map(|s| &s.outputs).map(|o| o.topic.name.clone()).collect();
         let sequence = Sequence::new(vec![players, node], &graph.timing)?;

@@ -1,18 +1,63 @@
 //! Keys that several kinds of nodes have: a simulated device, and the file that a key names.
 
 use crate::graph::files::Sources;
-use crate::graph::{DeviceFiles, Graph, Limits, Sensors};
+use crate::graph::{DeviceFiles, Graph, Limits, NodeKind, RealDevice, Sensors, Settings};
+use backdrive_devices::file::DeviceFile;
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::tomlfile::{FileError, Table};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(super) struct NodeReader<'a> {
     pub(super) files: &'a Sources<'a>,
     pub(super) graph: &'a mut Graph,
 }
 
+/// Keys that say what a simulated device is held by or touches; a real one has a real hand, and real things around it.
+const SIMULATED_ONLY: &[&str] =
+    &["grip", "grip_changes", "environment", "environment_on", "substeps", "sensors", "limits", "keep", "lock", "grip_on"];
+
 impl NodeReader<'_> {
+    /// `device` and `emulator`: the real device of a master or slave.
+    pub(super) fn real_device(&mut self, table: &mut Table, kind: NodeKind) -> Result<Option<RealDevice>, FileError> {
+        if !table.contains("device") {
+            return match table.contains("emulator") {
+                true => Err(table.error_at("emulator", "has no effect without a device: add device = \"FILE.toml\", its file")),
+                false => Ok(None),
+            };
+        }
+        if !matches!(kind, NodeKind::Master | NodeKind::Slave) {
+            return Err(table.error_at("device", "only a master or a slave has a device"));
+        }
+        let (text, path) = self.named(table, "device")?;
+        let file = DeviceFile::parse(&text, &path)?;
+        let emulator = table.string("emulator")?.map(PathBuf::from);
+        Ok(Some(RealDevice { file, emulator, is_recorded: !self.files.files.are_on_disk() }))
+    }
+
+    /// Settings and axes of a node with a real device. A model that stands beside it is what is known of the device: others compute with it.
+    pub(super) fn with_device(
+        &mut self,
+        table: &mut Table,
+        kind: NodeKind,
+        device: &RealDevice,
+    ) -> Result<(Settings, Vec<String>), FileError> {
+        let names = device.file.axis_names();
+        let files = match table.contains("model") {
+            true => {
+                let files = self.device(table, Some(if kind == NodeKind::Master { "grip" } else { "environment" }), false)?;
+                let axes = files.model.as_ref().map_or(0, |model| model.axes.len());
+                if axes != names.len() {
+                    let message = format!("has {axes} axes, and the device \"{}\" has {} joints", device.file.name, names.len());
+                    return Err(table.error_at("model", message));
+                }
+                files
+            }
+            false => DeviceFiles { model: None, fragment: None, substeps: None, real_sensors: true, grip_changes: Vec::new() },
+        };
+        SIMULATED_ONLY.iter().for_each(|key| table.skip(key));
+        Ok((if kind == NodeKind::Master { Settings::Master(files) } else { Settings::Slave(files) }, names))
+    }
     /// `model`, its fragment, `substeps` and `sensors` of a simulated device.
     pub(super) fn device(&mut self, table: &mut Table, fragment_key: Option<&str>, may_be_none: bool) -> Result<DeviceFiles, FileError> {
         let model_path = table.need_string("model")?;

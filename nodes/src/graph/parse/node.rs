@@ -37,9 +37,16 @@ impl NodeReader<'_> {
             None => Vec::new(),
             Some(topics) => read_topics(topics, kind)?,
         };
-        let (settings, axis_names) = self.settings(&mut table, kind, command.is_some())?;
+        let device = self.real_device(&mut table, kind)?;
+        if let (Some(_), Some(_)) = (&device, &command) {
+            return Err(table.error_at("device", "a program of your own (command) has its own device; omit one of both"));
+        }
+        let (settings, axis_names) = match &device {
+            Some(device) => self.with_device(&mut table, kind, device)?,
+            None => self.settings(&mut table, kind, command.is_some())?,
+        };
         table.finish()?;
-        let node = Node { name, kind, command, host, restart, axes: axis_names.len(), axis_names, topics, settings, line };
+        let node = Node { name, kind, command, host, restart, axes: axis_names.len(), axis_names, topics, device, settings, line };
         self.graph.nodes.push(node);
         Ok(())
     }
