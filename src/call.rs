@@ -5,8 +5,8 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, device, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, live, model, prove, replay, run, secret, shell,
-    simulate, stability, test_bench, why, why_now,
+    bag, bridge, compare, device, diagnose, doctor, export, fit, fleet, gate, graph, init, inspect, live, model, prove, replay, run,
+    secret, shell, simulate, stability, test_bench, why, why_now,
 };
 use clap::Parser;
 use std::sync::Arc;
