@@ -62,7 +62,7 @@ pub(crate) fn observed(problem: &Problem) -> Option<Problem> {
     })
 }
 
-/// The problem as it was recorded, without its observer.
+/// The recorded problem, without its observer.
 pub(crate) fn recorded(problem: &Problem) -> &Problem {
     problem.inverse.as_ref().filter(|inverse| inverse.motion == OBSERVER).map_or(problem, |inverse| inverse.recorded.as_ref())
 }
