@@ -97,24 +97,12 @@ fn searched(
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
     let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
-    // Of a device that drifts a free simulation adds up all errors; beside an observer each shows where and when it acts.
-    let mut of_motion = Vec::new();
-    let along = match observed::observed(&problem) {
-        Some(along) => {
-            report("simulating beside the recorded motion");
-            Some(by_simulation(along, options, limit, report, &mut of_motion)?)
-        }
-        None => None,
-    };
-    if along.as_ref().is_some_and(|found| explains(found) && is_at_noise(found)) {
-        remarks.extend(of_motion);
-        return along.ok_or(SearchError::RunsAway);
-    }
     let direct = match search_on_forces(&problem, options, limit, report) {
         Some(found) if !is_beyond(&found.1) => return Ok(found),
         direct => direct,
     };
     let turned = inverse(&problem);
+    let beside = observed::observed(&problem);
     let drifts = problem.drifts();
     let mut of_simulation = Vec::new();
     let simulated = by_simulation(problem, options, limit, report, &mut of_simulation)?;
@@ -123,6 +111,15 @@ fn searched(
         (Some(found), _) => Some(found),
         (None, Some(turned)) if forces_say_more => search_on_forces(&turned, options, limit, report),
         (None, _) => None,
+    };
+    // Of a device that drifts a free simulation adds up all errors; beside an observer each shows where and when it acts.
+    let mut of_motion = Vec::new();
+    let along = match beside.filter(|_| forces_say_more) {
+        Some(beside) => {
+            report("simulating beside the recorded motion");
+            Some(by_simulation(beside, options, limit, report, &mut of_motion)?)
+        }
+        None => None,
     };
     let sharper = tuning().equation_error.sharper;
     let before = on_forces.filter(|found| left_beside(&simulated, found).is_none_or(|share| share >= sharper));
