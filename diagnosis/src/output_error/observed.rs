@@ -7,10 +7,10 @@
 //! stiff gears, as they would along a prescribed motion.
 
 use crate::recordings::noise::white;
-use crate::recordings::observer::{OBSERVER, name_of, without_observer};
+use crate::recordings::observer::{OBSERVER, law_of, name_of, rescaled, without_observer};
 use crate::recordings::problem::{Inverse, Problem, Record};
 use crate::tuning::tuning;
-use backdrive_plant::elements::{Kind, Law, kind_named};
+use backdrive_plant::elements::kind_named;
 use backdrive_plant::model::{Body, Element, Hold, Input, InputKind, Model, OutputKind};
 use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::segments;
@@ -80,33 +80,6 @@ pub(crate) fn with_model(observed: &Problem, model: &Model) -> Option<Problem> {
     Some(Problem { model, stated: Vec::new(), ..observed.clone() })
 }
 
-/// A model whose observer accelerates the measured body as it does that of `reference`: as much firmer as the body is heavier. With an observer of one firmness a device
-/// without inertia and without force would follow its recording.
-pub(crate) fn rescaled(mut model: Model, reference: &Model) -> Model {
-    let inertia = |model: &Model| {
-        let spring = model.elements.iter().find(|e| e.name == name_of("spring"))?;
-        Some(model.bodies.get(spring.between[0]?)?.inertia)
-    };
-    let Some(factor) = inertia(&model).zip(inertia(reference)).map(|(own, other)| own / other) else { return model };
-    if factor == 1.0 || !factor.is_finite() {
-        return model;
-    }
-    for kind in ["spring", "damper"] {
-        let Some(at) = model.elements.iter().position(|e| e.name == name_of(kind)) else { return model };
-        let gain = |model: &Model| {
-            let element = model.elements.iter().find(|e| e.name == name_of(kind))?;
-            element.law.values().first()?.first().copied()
-        };
-        let (Some(gain), Some(registered), Some(element)) = (gain(reference), kind_named(kind), model.elements.get_mut(at)) else {
-            return model;
-        };
-        if let Some(law) = law_of(registered, factor * gain) {
-            element.law = law;
-        }
-    }
-    model
-}
-
 /// The output that is a position, and the body whose it is.
 fn measured_position(problem: &Problem) -> Option<(usize, usize)> {
     problem.model.outputs.iter().enumerate().find_map(|(index, output)| match output.kind {
@@ -126,13 +99,6 @@ fn with_observer(model: &Model, body: usize, gains: [f64; 2]) -> Option<Model> {
     }
     own.inputs.push(Input::ideal(OBSERVER, InputKind::Motion, observer, Hold::Cubic));
     Some(own)
-}
-
-/// A spring or damper of this size.
-fn law_of(kind: &Kind, size: f64) -> Option<Law> {
-    let values: Vec<Vec<f64>> =
-        kind.parameters.iter().enumerate().map(|(i, p)| vec![if i == 0 { size } else { p.default.unwrap_or(0.0) }]).collect();
-    (kind.build)(&values).ok()
 }
 
 /// Stiffness and damping of the observer.

@@ -2,9 +2,9 @@
 
 use crate::hypothesis::Hypothesis;
 use crate::output_error::coupling::Coupling;
-use crate::output_error::observed;
 use crate::output_error::simulate::{Conditions, Curve, Start, derivatives_under, predict_under};
 use crate::output_error::work::Budget;
+use crate::recordings::observer::rescaled;
 use crate::recordings::problem::{Problem, Record, Stated};
 use crate::recordings::unknown::Unknown;
 use crate::tuning::tuning;
@@ -267,7 +267,7 @@ impl Structure {
         for (hypothesis, values) in self.added.iter().zip(self.added_of(values)) {
             model = hypothesis.apply(&model, &values).ok()?;
         }
-        Some(observed::rescaled(model, &problem.model))
+        Some(rescaled(model, &problem.model))
     }
 
     /// Predictions of one of the records that the structure was made for, where it stands among them; see [`crate::output_error::simulate::predict`].
