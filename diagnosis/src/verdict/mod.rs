@@ -27,6 +27,7 @@ use crate::belief::decision::{Decision, Doubt, decide};
 use crate::belief::plausible;
 use crate::locate::Location;
 use crate::output_error::candidate::Candidate;
+use crate::output_error::observed::recorded;
 use crate::output_error::structure::{Role, Structure};
 use crate::output_error::work::{Budget, Limit};
 use crate::recordings::problem::Problem;
@@ -113,7 +114,9 @@ pub fn verdict(
 /// Errors on held-out recordings. Where what was found predicts them worse than the model as given does, the model as given is returned unchanged, and
 /// nothing is claimed as likelier than not.
 fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut Decision) -> HeldOut {
-    let errors = held_out(problem, search, decision.best, decision.changes);
+    // A model is used without an observer, and its errors are those of a free simulation.
+    let free = recorded(problem);
+    let errors = held_out(free, search, decision.best, decision.changes);
     let is_worse_than = |other: Option<f64>| other.zip(errors.nrmse_after).is_some_and(|(other, after)| after > other);
     let unseen = !problem.held_out.is_empty();
     decision.doubt = match () {
@@ -133,7 +136,7 @@ fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mu
         return errors;
     }
     decision.changes = false;
-    held_out(problem, search, decision.best, false)
+    held_out(free, search, decision.best, false)
 }
 
 /// Whether, of a device that forces drive and whose laws were looked at on forces, the model that would be written simulates the held-out motion worse.

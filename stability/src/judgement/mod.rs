@@ -42,14 +42,14 @@ pub fn judge(trace: &Trace) -> Outcome {
 
 /// The same, with the mode that is least sure to die where it was judged while the hand moved.
 pub fn judge_with_decay(trace: &Trace) -> (Outcome, Option<Decay>) {
-    let finite = trace.position.iter().chain(&trace.contact).position(|x| !x.is_finite());
+    let ran_away = [&trace.position, &trace.contact].into_iter().any(|signal| is_lost(signal));
     let span = trace.travel.map_or(1.0, |[low, high]| high - low);
     let largest = trace.position.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    if finite.is_some() || largest > 10.0 * span {
+    if ran_away || largest > 10.0 * span {
         return (Outcome::Unstable { growth_per_s: runaway_growth(trace) }, None);
     }
     let always = trace.closes == Closes::Always;
-    let touched = trace.contact.iter().any(|f| *f != 0.0);
+    let touched = trace.contact.iter().any(|f| f.is_finite() && *f != 0.0);
     let in_contact = share_clamped(trace, (0..trace.contact.len()).filter(|i| trace.contact[*i] != 0.0));
     let clamped_share = if always { in_contact.max(share_clamped_at_rest(trace)) } else { in_contact };
     let beyond_travel = trace.travel.is_some_and(|[low, high]| trace.position.iter().any(|x| *x < low || *x > high));
@@ -67,6 +67,12 @@ pub fn judge_with_decay(trace: &Trace) -> (Outcome, Option<Decay>) {
     let judged = judged.unwrap_or_else(|| Outcome::NotJudged { why: nothing() }).held_back(fault);
     let shakes = judged.is_unstable();
     (limited.filter(|_| !shakes).unwrap_or(judged), decay)
+}
+
+/// Whether a signal leaves all numbers. One that nobody measured, or not from the beginning, does not.
+fn is_lost(signal: &[f64]) -> bool {
+    let measured = signal.iter().position(|x| !x.is_nan()).unwrap_or(signal.len());
+    signal[measured..].iter().any(|x| !x.is_finite())
 }
 
 /// Share of these steps in which a clamp acted.
@@ -152,6 +158,15 @@ fn runaway_growth(trace: &Trace) -> f64 {
 mod tests {
     use super::*;
     use crate::unjudged::Gaps;
+
+    #[test]
+    fn a_force_that_nobody_measured_is_no_runaway() {
+        let calm = Trace { contact: vec![f64::NAN; 10_000], ..trace(|t| 0.006 * t.min(1.0)) };
+        assert!(!judge(&calm).is_unstable(), "{:?}", judge(&calm));
+        let mut lost = calm.clone();
+        lost.position[9_000] = f64::INFINITY;
+        assert!(judge(&lost).is_unstable());
+    }
 
     fn trace(position: impl Fn(f64) -> f64) -> Trace {
         let times = (0..10_000).map(|i| i as f64 * 2e-4);
