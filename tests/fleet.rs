@@ -54,7 +54,7 @@ fn threads_shards_and_kills_give_the_same_table() {
     }
     assert!(table(&place, "four") == expected, "four shards give another table");
     // Killed after more and more time, each continues where the one before was.
-    let kills = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { 30 } else { 4 };
+    let kills = if std::env::var("BACKDRIVE_FULL").as_deref() == Ok("1") { 30 } else { 4 };
     for kill in 0..kills {
         let mut child = place.command(env!("CARGO_BIN_EXE_backdrive")).args(fleet("killed", &model, &["--jobs", "2"])).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(20 + 37 * kill % 400));

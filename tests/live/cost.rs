@@ -1,4 +1,4 @@
-//! What two viewers cost a loop: times of a step and losses beside those of a run that nobody looks at. `BACKDRIVE_LONG=1` runs it.
+//! What two viewers cost a loop: times of a step and losses beside those of a run that nobody looks at. `BACKDRIVE_FULL=1` runs it.
 
 use super::Run;
 use super::viewer::Viewer;
@@ -23,8 +23,8 @@ fn run(viewers: usize) -> Value {
 
 #[test]
 fn two_viewers_cost_the_loop_next_to_nothing() {
-    if std::env::var_os("BACKDRIVE_LONG").is_none() {
-        eprintln!("skipped: BACKDRIVE_LONG=1 runs it");
+    if std::env::var_os("BACKDRIVE_FULL").is_none() {
+        eprintln!("skipped: BACKDRIVE_FULL=1 runs it");
         return;
     }
     let mut ratios = Vec::new();
