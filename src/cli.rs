@@ -147,7 +147,7 @@ pub enum Command {
     #[command(after_help = live::HELP)]
     Live(Live),
     /// Find what answers on a bus, write a device's file, check it, or emulate a bus of servos.
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example:\n  backdrive device find /dev/ttyUSB0")]
     Device(Device),
     /// Publish the topics of a local graph on ROS 2; nothing is received from there without --both-ways.
     #[command(after_help = bridge::HELP)]
