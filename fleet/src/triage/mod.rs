@@ -2,7 +2,7 @@
 //!
 //! The torque of a joint less that of the model's links is `dry·s + viscous·v + constant + gain·τ_links + inertia·a - lag·dτ_links/dt`, where s is the
 //! direction of dry friction. Of a joint by commands and positions the command less the position takes the place of the torque. Both sides go through the
-//! filters of the regression of arms ([`backdrive_diagnosis::arms::motion`]). Delay and lost motion of a servo are fitted in time ([`response`](mod@response)).
+//! filters of the regression of arms ([`backdrive_diagnosis::arms::motion`]). Delay and lost motion of a servo are fitted in time (`triage/response.rs`).
 
 mod joints;
 mod regress;
