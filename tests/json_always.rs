@@ -65,6 +65,8 @@ fn absent(verb: &[String]) -> Option<Vec<&'static str>> {
         ["bag", "diff"] => vec!["absent.mcap", "other.mcap"],
         // A machine is examined without changes.
         ["doctor"] => return None,
+        // A port is no file, and belongs to the machine.
+        ["device", "find" | "new"] => return None,
         _ => vec!["absent"],
     })
 }
