@@ -48,14 +48,14 @@ pub struct Window {
 }
 
 struct BagDesk {
-    hub: Arc<Hub<Told>>,
+    hub: Arc<Hub<Headers>>,
     recordings: Vec<Recording>,
 }
 
 /// What a viewer is sent first.
-struct Told(Value);
+struct Headers(Value);
 
-impl Past for Told {
+impl Past for Headers {
     fn frames(&self) -> Vec<Frame> {
         vec![text(&self.0)]
     }
@@ -70,9 +70,9 @@ impl Window {
         if bags.is_empty() || bags.len() > MOST_BAGS {
             return Err(LiveError::input(format!("{} bags are named; one is shown, or two over each other", bags.len())));
         }
-        let (recordings, told): (Vec<_>, Vec<_>) = bags.iter().map(|bag| read(bag)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let title = told.iter().filter_map(|t| t["name"].as_str()).collect::<Vec<_>>().join(" and ");
-        let hub = Hub::new(Told(json!({ "type": "hello", "mode": "bag", "title": title, "recordings": told })));
+        let (recordings, headers): (Vec<_>, Vec<_>) = bags.iter().map(|bag| read(bag)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        let title = headers.iter().filter_map(|header| header["name"].as_str()).collect::<Vec<_>>().join(" and ");
+        let hub = Hub::new(Headers(json!({ "type": "hello", "mode": "bag", "title": title, "recordings": headers })));
         let server = Server::start(Arc::new(BagDesk { hub, recordings }), address)?;
         Ok(Window { server })
     }
@@ -122,7 +122,7 @@ fn read(path: &Path) -> Result<(Recording, Value), LiveError> {
         }
     }
     let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
-    let told = json!({
+    let header = json!({
         "name": name,
         "title": graph.title,
         "rate_hz": rate_hz,
@@ -131,7 +131,7 @@ fn read(path: &Path) -> Result<(Recording, Value), LiveError> {
         "channels": channels.known(),
         "events": events,
     });
-    Ok((Recording { rate_hz, curves }, told))
+    Ok((Recording { rate_hz, curves }, header))
 }
 
 impl Recording {

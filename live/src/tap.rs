@@ -107,7 +107,7 @@ pub(crate) type Watcher = Box<dyn FnMut(usize, &Message) + Send>;
 
 /// Carries from the run to the hub until `over`, or the run has ended.
 pub(crate) fn carry(tap: &mut Tap, hub: &Hub<Running>, paths: &RunPaths, over: &AtomicBool, mut watchers: Vec<Watcher>) {
-    let (mut told, mut looked) = (Instant::now(), Instant::now());
+    let (mut published, mut looked) = (Instant::now(), Instant::now());
     let mut known = 0;
     loop {
         let due = Instant::now() + POLL;
@@ -138,8 +138,8 @@ pub(crate) fn carry(tap: &mut Tap, hub: &Hub<Running>, paths: &RunPaths, over: &
             if !events.is_empty() {
                 hub.send(text(&json!({ "type": "events", "events": events })));
             }
-            if told.elapsed() >= STATE_EVERY || ends {
-                told = Instant::now();
+            if published.elapsed() >= STATE_EVERY || ends {
+                published = Instant::now();
                 hub.send(text(&picture.state()));
             }
         }

@@ -53,12 +53,12 @@ impl Running {
         let file = EmulatorFile::load(file).unwrap();
         let faults = Faults::of(faults, file.seed).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
-        let (told, port) = channel();
+        let (opened, port) = channel();
         let stopped = Arc::clone(&stop);
         let link = folder.path().join("port");
         let thread = std::thread::spawn(move || {
             let mut emulator = open(&file, faults, Some(&link)).unwrap();
-            told.send(link).unwrap();
+            opened.send(link).unwrap();
             emulator.run(&mut || stopped.load(Ordering::Relaxed));
             emulator.faults()
         });
