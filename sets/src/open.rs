@@ -41,7 +41,6 @@ pub fn open(recordings: &Recordings, model: Option<&Path>, grip: Option<&Path>, 
     }
     hold_out(&mut set, states_fit, &mut notes);
     notes.extend(checks::repeated(&set)?);
-    notes.extend(set.paths().iter().filter_map(|path| unfinished(path)));
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| begun(&set, file)));
     let problem = match grip {
         None => Problem::of_set(&set, model),
@@ -90,8 +89,9 @@ pub fn set_of(recordings: &Recordings) -> Result<(RecordingSet, bool), SetError>
     }
 }
 
-/// Holds the last of several recordings out where the set does not say what is.
+/// Holds the last of several recordings out where the set does not say what is. Notes say so, and which recordings did not come to their end.
 pub fn hold_out(set: &mut RecordingSet, states_fit: bool, notes: &mut Vec<String>) {
+    notes.extend(set.paths().iter().filter_map(|path| unfinished(path)));
     if set.held_out.is_empty() {
         match set.fit.len() {
             // Where a set.toml states what is fitted, that is not changed.
