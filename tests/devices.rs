@@ -69,6 +69,12 @@ fn a_pair_of_emulated_arms_runs_with_one_command_and_its_bag_says_what_was_measu
     assert!(bus.len() > 20 && last.position[0] > 1.0 && last.position[0] < 220.0, "{last:?}");
     assert!(current.iter().any(|s| measured(s.position[0]).is_some_and(|a| a > 0.0)));
     assert!(samples(&bag, "/leader/temperature").iter().filter_map(|s| measured(s.position[0])).all(|t| t == 32.0));
+    // A bag that was cut off is diagnosed as far as it goes, and called so.
+    let whole = std::fs::read(&bag).unwrap();
+    std::fs::write(place.path("cut.mcap"), &whole[..whole.len() * 3 / 4]).unwrap();
+    let cut = place.backdrive(&["diagnose", "cut.mcap", "--out", "cut", "--no-report"]);
+    assert!(matches!(cut.code, Some(0 | 1)), "{cut:?}");
+    assert_names(&cut.stderr, &["cut.mcap was not closed", "bag recover"]);
     // What is hidden is nowhere in the bag.
     let reader = Reader::open(&bag).unwrap();
     let held = reader.header().unwrap();
